@@ -1,0 +1,43 @@
+# What there is to do with Alhazen. Every target sets up what it needs (scripts/setup.sh: a second
+# when nothing is missing); a fresh Debian with Rust, make and root (or sudo) is enough.
+
+CARGO ?= cargo
+SETUP := ./scripts/setup.sh
+
+.PHONY: help setup build demo test verify bench lint doc clean
+
+help: ## Lists these targets
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 14
+
+setup: ## Installs the C compiler, libclang and Embree 4 where they are missing
+	@$(SETUP) build
+
+build: setup ## Builds the release binary: target/release/alhazen
+	$(CARGO) build --release --locked
+
+demo: build ## Renders scenes/showcase.toml to out/showcase.exr and out/showcase.png
+	@mkdir -p out
+	target/release/alhazen render scenes/showcase.toml -o out/showcase.exr -o out/showcase.png
+
+test: ## Runs every test, with and without Embree
+	@$(SETUP) test
+	$(CARGO) test --locked
+	$(CARGO) test --locked --no-default-features --target-dir target/no-embree
+
+verify: test ## Runs what takes longer: many more random rays and scenes
+	ALHAZEN_VERIFY=1 $(CARGO) test --locked --release
+
+bench: setup ## Measures ray queries against bare Embree
+	$(CARGO) bench --locked
+
+lint: setup ## Formatting, clippy and documentation without warnings
+	$(CARGO) fmt --check
+	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --all-targets --no-default-features --target-dir target/no-embree -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
+
+doc: setup ## Builds the library's documentation: target/doc/alhazen
+	$(CARGO) doc --locked --no-deps
+
+clean: ## Removes what was built; the Embree of .embree stays
+	$(CARGO) clean

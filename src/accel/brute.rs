@@ -1,0 +1,153 @@
+//! Every ray against every primitive, in f64: slow, plain, and what the others are compared with.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::world::{CopyRef, Geometry, World, affine_from_rows};
+use super::{AccelInfo, Hit, RayQuery};
+use crate::geometry::{Sphere, TriangleMesh, intersect_triangle};
+use crate::math::{Bounds, Ray};
+
+/// The oracle: no hierarchy; boxes around whole geometries only.
+#[derive(Debug)]
+pub struct BruteForce {
+    root: Vec<Part>,
+    prototypes: Vec<Vec<Part>>,
+    copies: Vec<Copy>,
+}
+
+/// One geometry and its box, a little enlarged.
+#[derive(Debug)]
+struct Part {
+    shape: Shape,
+    bounds: Bounds,
+}
+
+#[derive(Debug)]
+enum Shape {
+    Mesh(TriangleMesh),
+    Spheres(Arc<Vec<Sphere>>),
+}
+
+/// One copy of a prototype.
+#[derive(Debug)]
+struct Copy {
+    id: CopyRef,
+    prototype: usize,
+    object_from_world: DAffine3,
+}
+
+impl BruteForce {
+    /// Takes references to the geometry of `world`; nothing is built.
+    pub fn new(world: &World) -> Self {
+        let parts = |geometries: &[Geometry]| geometries.iter().map(Part::new).collect();
+        let copies = (0u32..).zip(&world.sets).flat_map(|(set, s)| {
+            (0u32..).zip(s.transforms.iter()).map(move |(index, rows)| Copy {
+                id: CopyRef { set, index },
+                prototype: s.prototype as usize,
+                object_from_world: affine_from_rows(rows).inverse(),
+            })
+        });
+        Self {
+            root: parts(&world.root.geometries),
+            prototypes: world.prototypes.iter().map(|g| parts(&g.geometries)).collect(),
+            copies: copies.collect(),
+        }
+    }
+
+    /// Name and sizes, for reports.
+    pub fn info(&self) -> AccelInfo {
+        let bytes = self.copies.len() * size_of::<Copy>();
+        AccelInfo { name: "brute force".into(), isa: "f64", packet_width: 1, bytes: bytes as u64 }
+    }
+
+    /// Calls `found` with every hit in turn; it returns how far to go on looking.
+    fn visit(
+        &self,
+        ray: &Ray,
+        mut found: impl FnMut(f64, f64, f64, [u32; 2], Option<CopyRef>) -> f64,
+    ) {
+        let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let (t_min, mut t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
+        let mut visit = |parts: &[Part], o: DVec3, d: DVec3, copy: Option<CopyRef>| {
+            for (geometry, part) in (0u32..).zip(parts) {
+                part.visit(o, d, t_min, &mut t_max, |t, u, v, primitive| {
+                    found(t, u, v, [geometry, primitive], copy)
+                });
+            }
+        };
+        visit(&self.root, o, d, None);
+        for copy in &self.copies {
+            let m = &copy.object_from_world;
+            let (o, d) = (m.transform_point3(o), m.transform_vector3(d));
+            visit(&self.prototypes[copy.prototype], o, d, Some(copy.id));
+        }
+    }
+}
+
+impl Part {
+    fn new(geometry: &Geometry) -> Self {
+        let b = geometry.bounds();
+        let pad = DVec3::splat(
+            1e-9 * (b.size().max_element() + b.min.abs().max(b.max.abs()).max_element()),
+        );
+        let shape = match geometry {
+            Geometry::Mesh(mesh) => Shape::Mesh(mesh.clone()),
+            Geometry::Spheres(spheres) => Shape::Spheres(Arc::clone(spheres)),
+        };
+        Self { shape, bounds: Bounds { min: b.min - pad, max: b.max + pad } }
+    }
+
+    fn visit(
+        &self,
+        o: DVec3,
+        d: DVec3,
+        t_min: f64,
+        t_max: &mut f64,
+        mut found: impl FnMut(f64, f64, f64, u32) -> f64,
+    ) {
+        if self.bounds.clip(o, d).is_none() {
+            return;
+        }
+        match &self.shape {
+            Shape::Mesh(mesh) => {
+                for i in 0..mesh.triangles.len() {
+                    let corners = mesh.corners(i).map(|p| p.as_dvec3());
+                    if let Some(h) = intersect_triangle(corners, o, d, t_min, *t_max) {
+                        *t_max = found(h.t, h.u, h.v, i as u32);
+                    }
+                }
+            }
+            Shape::Spheres(spheres) => {
+                for (i, sphere) in spheres.iter().enumerate() {
+                    if let Some(t) = sphere.intersect(o, d, t_min, *t_max) {
+                        *t_max = found(t, 0.0, 0.0, i as u32);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl RayQuery for BruteForce {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let mut closest = None;
+        self.visit(ray, |t, u, v, [geometry, primitive], copy| {
+            let (t32, u, v) = (t as f32, u as f32, v as f32);
+            closest = Some(Hit { t: t32, u, v, primitive, geometry, copy });
+            t
+        });
+        closest
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        let mut any = false;
+        self.visit(ray, |_, _, _, _, _| {
+            any = true;
+            // Nothing is nearer than nothing: every further test fails at once.
+            f64::NEG_INFINITY
+        });
+        any
+    }
+}

@@ -1,0 +1,325 @@
+//! Embree behind the seam: which query for which ray (measured: see ARCHITECTURE.md), and how
+//! Embree's ids become ours.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::block::{HitBlock, LANES, RayBlock, lanes_of};
+use super::world::{CopyRef, Geometry, Group, InstanceSet, World};
+use super::{AccelError, AccelInfo, BuildOptions, BuildQuality, Hit, Precision, RayQuery};
+use crate::embree::{
+    self, Device, DeviceConfig, EmbreeError, ErrorCode, INVALID_ID, PacketMask, Quality,
+    RayHitPacket, RayPacket, Scene, SceneBuilder, SceneFlags, UserBounds, UserGeometry, UserHit,
+};
+use crate::geometry::Sphere;
+use crate::math::Ray;
+
+/// Sets with more copies than this become instance arrays: 90 bytes a copy instead of 330, for
+/// rays that are up to a seventh slower.
+const ARRAY_FROM: usize = 1 << 16;
+
+/// A committed Embree scene.
+#[derive(Debug)]
+pub struct EmbreeAccel {
+    scene: Scene,
+    packet_width: usize,
+    /// For each instance set its first instance id and whether it is one array, by rising id.
+    sets: Vec<SetIds>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct SetIds {
+    first: u32,
+    is_array: bool,
+}
+
+impl EmbreeAccel {
+    /// Builds prototypes first, then the world around them.
+    ///
+    /// # Errors
+    /// [`AccelError`] where memory runs out or `progress` returns false.
+    pub fn build(
+        world: &World,
+        options: &BuildOptions,
+        progress: &(dyn Fn(f64) -> bool + Sync),
+    ) -> Result<Self, AccelError> {
+        let config = DeviceConfig {
+            threads: options.threads,
+            isa: None,
+            memory_limit: options.memory_limit,
+        };
+        let device = Device::new(&config)?;
+        Self::build_on(&device, world, options, progress).map_err(|e| {
+            match (e, options.memory_limit) {
+                (EmbreeError::Cancelled, _) => AccelError::Interrupted,
+                (EmbreeError::Native { code: ErrorCode::OUT_OF_MEMORY, .. }, Some(limit)) => {
+                    AccelError::MemoryLimit { limit }
+                }
+                (e, _) => AccelError::Embree(e),
+            }
+        })
+    }
+
+    /// As [`EmbreeAccel::build`], on a device of the caller's.
+    ///
+    /// # Errors
+    /// As Embree reports them.
+    pub fn build_on(
+        device: &Device,
+        world: &World,
+        options: &BuildOptions,
+        progress: &(dyn Fn(f64) -> bool + Sync),
+    ) -> Result<Self, EmbreeError> {
+        let quality = match options.quality {
+            BuildQuality::Low => Quality::Low,
+            BuildQuality::High => Quality::High,
+            BuildQuality::Auto | BuildQuality::Medium => Quality::Medium,
+        };
+        let flags = match options.precision {
+            Precision::Fast => SceneFlags::NONE,
+            Precision::Robust => SceneFlags::ROBUST,
+        };
+        // Every group counts by its primitives towards the progress.
+        let size = |group: &Group| group.geometries.iter().map(Geometry::len).sum::<usize>().max(1);
+        let sizes = world.prototypes.iter().chain([&world.root]).map(size);
+        let total = sizes.sum::<usize>() as f64;
+        let mut done = 0.0;
+        let mut commit = |builder: SceneBuilder, size: usize| {
+            let share = size as f64 / total;
+            let scene = builder.commit_with(&|x: f64| progress(done + share * x))?;
+            done += share;
+            Ok::<_, EmbreeError>(scene)
+        };
+
+        let mut prototypes = Vec::with_capacity(world.prototypes.len());
+        for group in &world.prototypes {
+            let mut builder = SceneBuilder::new(device, flags, quality)?;
+            attach_group(&mut builder, device, group, quality)?;
+            prototypes.push(commit(builder, size(group))?);
+        }
+        let mut builder = SceneBuilder::new(device, flags, quality)?;
+        attach_group(&mut builder, device, &world.root, quality)?;
+        let sets = world
+            .sets
+            .iter()
+            .map(|set| attach_set(&mut builder, device, &prototypes[set.prototype as usize], set))
+            .collect::<Result<Vec<_>, EmbreeError>>()?;
+        let scene = commit(builder, size(&world.root))?;
+        Ok(Self { scene, packet_width: device.packet_width(), sets })
+    }
+
+    /// Name, version, instruction set and memory, for reports and file headers.
+    pub fn info(&self) -> AccelInfo {
+        let device = self.scene.device();
+        AccelInfo {
+            name: format!("Embree {}", device.version()),
+            isa: device.isa().name(),
+            packet_width: self.packet_width,
+            bytes: device.memory().current,
+        }
+    }
+
+    /// Our ids for Embree's.
+    #[inline]
+    fn hit(&self, hit: &embree::Hit) -> Option<Hit> {
+        // Huge coordinates can give a hit without a distance.
+        if !hit.t.is_finite() {
+            return None;
+        }
+        let copy = if hit.instance == INVALID_ID {
+            None
+        } else {
+            let set = self.sets.partition_point(|s| s.first <= hit.instance) - 1;
+            let SetIds { first, is_array } = self.sets[set];
+            let index = if is_array { hit.instance_primitive } else { hit.instance - first };
+            Some(CopyRef { set: set as u32, index })
+        };
+        // Robust traversal leaves the weights a little outside where the origin is far.
+        let u = hit.u.clamp(0.0, 1.0);
+        let v = hit.v.clamp(0.0, 1.0 - u);
+        Some(Hit { t: hit.t, u, v, primitive: hit.primitive, geometry: hit.geometry, copy })
+    }
+
+    fn intersect_packets<const N: usize>(&self, rays: &RayBlock) -> HitBlock {
+        let mut hits = HitBlock::from_fn(0, |_| None);
+        for start in (0..LANES).step_by(N) {
+            let bits = lane_bits::<N>(rays.active(), start);
+            if bits == 0 {
+                continue;
+            }
+            let mut packet = RayHitPacket::new(load::<N>(rays, start));
+            self.scene.intersect_packet(&PacketMask::from_bits(bits), &mut packet);
+            let (ray, hit) = (&packet.ray, &packet.hit);
+            for i in lanes_of(bits as u16).filter(|&i| hit.geometry[i] != INVALID_ID) {
+                hits.set(
+                    start + i,
+                    self.hit(&embree::Hit {
+                        t: ray.t_max[i],
+                        u: hit.u[i],
+                        v: hit.v[i],
+                        ng: [0.0; 3],
+                        primitive: hit.primitive[i],
+                        geometry: hit.geometry[i],
+                        instance: hit.instance[i],
+                        instance_primitive: hit.instance_primitive[i],
+                    }),
+                );
+            }
+        }
+        hits
+    }
+
+    fn occluded_packets<const N: usize>(&self, rays: &RayBlock) -> u16 {
+        let mut occluded = 0;
+        for start in (0..LANES).step_by(N) {
+            let bits = lane_bits::<N>(rays.active(), start);
+            if bits == 0 {
+                continue;
+            }
+            let mut packet = load::<N>(rays, start);
+            self.scene.occluded_packet(&PacketMask::from_bits(bits), &mut packet);
+            for i in lanes_of(bits as u16).filter(|&i| packet.is_occluded(i)) {
+                occluded |= 1 << (start + i);
+            }
+        }
+        occluded
+    }
+}
+
+impl RayQuery for EmbreeAccel {
+    #[inline]
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.scene.intersect(&native(ray)).and_then(|hit| self.hit(&hit))
+    }
+
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.scene.occluded(&native(ray))
+    }
+
+    #[inline]
+    fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
+        match self.packet_width {
+            16 => self.intersect_packets::<16>(rays),
+            8 => self.intersect_packets::<8>(rays),
+            4 => self.intersect_packets::<4>(rays),
+            _ => HitBlock::from_fn(rays.active(), |lane| self.intersect(&rays.get(lane))),
+        }
+    }
+
+    #[inline]
+    fn occluded_block(&self, rays: &RayBlock) -> u16 {
+        match self.packet_width {
+            16 => self.occluded_packets::<16>(rays),
+            8 => self.occluded_packets::<8>(rays),
+            4 => self.occluded_packets::<4>(rays),
+            _ => rays
+                .lanes()
+                .filter(|&lane| self.occluded(&rays.get(lane)))
+                .fold(0, |bits, lane| bits | 1 << lane),
+        }
+    }
+}
+
+/// The active lanes among the `N` from `start` on.
+#[inline]
+fn lane_bits<const N: usize>(active: u16, start: usize) -> u32 {
+    u32::from(active) >> start & ((1 << N) - 1)
+}
+
+/// Lanes `start .. start + N` as Embree's packet.
+#[inline]
+fn load<const N: usize>(rays: &RayBlock, start: usize) -> RayPacket<N> {
+    let mut packet = RayPacket::empty();
+    for (to, from) in [
+        (&mut packet.org_x, &rays.org_x),
+        (&mut packet.org_y, &rays.org_y),
+        (&mut packet.org_z, &rays.org_z),
+        (&mut packet.t_min, &rays.t_min),
+        (&mut packet.dir_x, &rays.dir_x),
+        (&mut packet.dir_y, &rays.dir_y),
+        (&mut packet.dir_z, &rays.dir_z),
+        (&mut packet.t_max, &rays.t_max),
+    ] {
+        to.copy_from_slice(&from[start..start + N]);
+    }
+    packet
+}
+
+#[inline]
+fn native(ray: &Ray) -> embree::Ray {
+    embree::Ray {
+        origin: ray.origin.to_array(),
+        direction: ray.direction.to_array(),
+        t_min: ray.t_min,
+        t_max: ray.t_max,
+    }
+}
+
+fn attach_group(
+    builder: &mut SceneBuilder,
+    device: &Device,
+    group: &Group,
+    quality: Quality,
+) -> Result<(), EmbreeError> {
+    for (index, geometry) in (0u32..).zip(&group.geometries) {
+        let geometry = match geometry {
+            Geometry::Mesh(mesh) => embree::Geometry::triangles(
+                device,
+                mesh.positions.shared(),
+                Arc::clone(&mesh.triangles),
+                quality,
+            )?,
+            Geometry::Spheres(spheres) => {
+                let bounds = spheres.iter().map(outer_bounds).collect();
+                embree::Geometry::user(device, bounds, Arc::new(Spheres(Arc::clone(spheres))))?
+            }
+        };
+        let id = builder.attach(geometry);
+        // Hits are told apart by these ids: ours are Embree's.
+        assert_eq!(id, index, "Embree numbers geometries in order");
+    }
+    Ok(())
+}
+
+fn attach_set(
+    builder: &mut SceneBuilder,
+    device: &Device,
+    prototype: &Scene,
+    set: &InstanceSet,
+) -> Result<SetIds, EmbreeError> {
+    if set.transforms.len() > ARRAY_FROM {
+        let transforms = Arc::clone(&set.transforms);
+        let array = embree::Geometry::instance_array(device, prototype, transforms)?;
+        return Ok(SetIds { first: builder.attach(array), is_array: true });
+    }
+    let mut first = INVALID_ID;
+    for transform in set.transforms.iter() {
+        let id = builder.attach(embree::Geometry::instance(device, prototype, transform)?);
+        first = first.min(id);
+    }
+    Ok(SetIds { first, is_array: false })
+}
+
+/// The box of a sphere, rounded outward to f32.
+fn outer_bounds(sphere: &Sphere) -> UserBounds {
+    let b = sphere.bounds();
+    let down = |p: DVec3| p.as_vec3().to_array().map(f32::next_down);
+    let up = |p: DVec3| p.as_vec3().to_array().map(f32::next_up);
+    UserBounds { lower: down(b.min), upper: up(b.max) }
+}
+
+/// Spheres as Embree's callbacks see them: solved in f64.
+struct Spheres(Arc<Vec<Sphere>>);
+
+impl UserGeometry for Spheres {
+    #[inline]
+    fn intersect(&self, primitive: u32, ray: &embree::Ray) -> Option<UserHit> {
+        let sphere = self.0.get(primitive as usize)?;
+        let (origin, direction) =
+            (DVec3::from(ray.origin.map(f64::from)), DVec3::from(ray.direction.map(f64::from)));
+        let t = sphere.intersect(origin, direction, f64::from(ray.t_min), f64::from(ray.t_max))?;
+        Some(UserHit { t: t as f32, u: 0.0, v: 0.0 })
+    }
+}

@@ -1,0 +1,238 @@
+//! The one seam for ray queries: what there is to hit goes in, hits come out. Embree on one side, a
+//! brute-force loop in f64 on the other, with the same answers.
+//!
+//! It owns how rays are found to hit something, and decides which query suits which ray. It does not
+//! know what a hit looks like: materials, lights and normals are the scene's.
+
+mod block;
+mod brute;
+#[cfg(feature = "embree")]
+mod embree;
+mod world;
+
+use std::fmt;
+
+pub use block::{HitBlock, LANES, RayBlock};
+pub use brute::BruteForce;
+#[cfg(feature = "embree")]
+pub use embree::EmbreeAccel;
+pub use world::{
+    CopyRef, Geometry, Group, InstanceSet, Transform3x4, World, affine_from_rows, rows_from_affine,
+};
+
+use crate::math::Ray;
+
+/// Closest hit and visibility: all that light transport asks of an acceleration structure.
+pub trait RayQuery: Sync {
+    /// The closest hit at t in (`t_min`, `t_max`].
+    fn intersect(&self, ray: &Ray) -> Option<Hit>;
+
+    /// Whether there is any such hit.
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// The closest hits of rays that run close together.
+    fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
+        HitBlock::from_fn(rays.active(), |lane| self.intersect(&rays.get(lane)))
+    }
+
+    /// Which active rays of a block that run close together are blocked, as bits.
+    fn occluded_block(&self, rays: &RayBlock) -> u16 {
+        rays.lanes()
+            .filter(|&lane| self.occluded(&rays.get(lane)))
+            .fold(0, |bits, lane| bits | 1 << lane)
+    }
+}
+
+/// A hit, in ids of the [`World`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray.
+    pub t: f32,
+    /// Barycentric weight of a triangle's second corner, in [0, 1]; 0 for other shapes.
+    pub u: f32,
+    /// Barycentric weight of its third corner.
+    pub v: f32,
+    /// Index within the geometry.
+    pub primitive: u32,
+    /// Index within the group.
+    pub geometry: u32,
+    /// The copy that was hit; none in the root group.
+    pub copy: Option<CopyRef>,
+}
+
+/// How far a build may go to make hits exact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// Embree's defaults: some rays are lost at edges and far from the origin.
+    Fast,
+    /// Watertight at edges, accurate far from the origin.
+    #[default]
+    Robust,
+}
+
+impl Precision {
+    /// All rungs of the ladder.
+    pub const ALL: [Self; 2] = [Self::Fast, Self::Robust];
+
+    /// The name in scene files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Robust => "robust",
+        }
+    }
+}
+
+/// How much work goes into building the hierarchy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BuildQuality {
+    /// As suits the scene.
+    #[default]
+    Auto,
+    /// Fast to build.
+    Low,
+    /// Between the two.
+    Medium,
+    /// Fast to trace; differs from medium only with `precision = "fast"`.
+    High,
+}
+
+impl BuildQuality {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Auto, Self::Low, Self::Medium, Self::High];
+
+    /// The name in scene files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Low => "low",
+            Self::Medium => "medium",
+            Self::High => "high",
+        }
+    }
+}
+
+/// The acceleration structures that can be chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AccelKind {
+    /// Embree 4.
+    #[cfg(feature = "embree")]
+    Embree,
+    /// Every ray against every primitive, in f64: the oracle, for small scenes.
+    Brute,
+}
+
+impl AccelKind {
+    /// Those that this build holds, the default first.
+    pub const ALL: &[Self] = &[
+        #[cfg(feature = "embree")]
+        Self::Embree,
+        Self::Brute,
+    ];
+
+    /// The name in scene files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            #[cfg(feature = "embree")]
+            Self::Embree => "embree",
+            Self::Brute => "brute",
+        }
+    }
+}
+
+impl Default for AccelKind {
+    fn default() -> Self {
+        Self::ALL[0]
+    }
+}
+
+/// What a build is asked for.
+#[derive(Debug, Clone, Default)]
+pub struct BuildOptions {
+    /// Which structure.
+    pub kind: AccelKind,
+    /// How exact.
+    pub precision: Precision,
+    /// How much work.
+    pub quality: BuildQuality,
+    /// Threads of the build; all where not given.
+    pub threads: Option<usize>,
+    /// Bytes that the structure may hold.
+    pub memory_limit: Option<u64>,
+}
+
+/// What was built, for reports and file headers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AccelInfo {
+    /// Name and version.
+    pub name: String,
+    /// The instruction set that queries use; hits may differ in their last bits between two.
+    pub isa: &'static str,
+    /// Rays traced at once where they run close together.
+    pub packet_width: usize,
+    /// Bytes held.
+    pub bytes: u64,
+}
+
+/// Why nothing was built.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AccelError {
+    /// Embree refused.
+    #[cfg(feature = "embree")]
+    #[error(transparent)]
+    Embree(#[from] crate::embree::EmbreeError),
+    /// The build was interrupted.
+    #[error("the build was interrupted")]
+    Interrupted,
+    /// The structure would exceed the memory limit.
+    #[error("building the hierarchy needs more than the memory limit of {limit} bytes")]
+    MemoryLimit {
+        /// The limit.
+        limit: u64,
+    },
+}
+
+/// An acceleration structure that was built. Match on it once, outside the loop over rays.
+#[derive(Debug)]
+pub enum Accel {
+    /// Embree 4.
+    #[cfg(feature = "embree")]
+    Embree(EmbreeAccel),
+    /// Every ray against every primitive.
+    Brute(BruteForce),
+}
+
+impl Accel {
+    /// Builds the structure over `world`. `progress` hears of it from 0 to 1, perhaps on several
+    /// threads at once, and ends the build by returning false.
+    ///
+    /// # Errors
+    /// [`AccelError`] where memory runs out or the build is interrupted.
+    pub fn build(
+        world: &World,
+        options: &BuildOptions,
+        progress: &(dyn Fn(f64) -> bool + Sync),
+    ) -> Result<Self, AccelError> {
+        match options.kind {
+            #[cfg(feature = "embree")]
+            AccelKind::Embree => EmbreeAccel::build(world, options, progress).map(Self::Embree),
+            AccelKind::Brute => Ok(Self::Brute(BruteForce::new(world))),
+        }
+    }
+
+    /// What was built.
+    pub fn info(&self) -> AccelInfo {
+        match self {
+            #[cfg(feature = "embree")]
+            Self::Embree(accel) => accel.info(),
+            Self::Brute(accel) => accel.info(),
+        }
+    }
+}
+
+impl fmt::Display for AccelInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({}, packets of {})", self.name, self.isa, self.packet_width)
+    }
+}

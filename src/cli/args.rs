@@ -1,0 +1,161 @@
+//! Flags as typed.
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Parser, Subcommand};
+
+use super::units::{parse_bytes, parse_crop, parse_size};
+use crate::accel::{AccelKind, BuildQuality, Precision};
+use crate::film::{Filter, PixelRect};
+use crate::io::{ExrCompression, PixelType};
+use crate::scene::IntegratorKind;
+
+/// Alhazen: a scene or a bare mesh in, an HDR EXR picture out, fast, with a known error.
+#[derive(Debug, Parser)]
+#[command(
+    name = "alhazen",
+    version,
+    max_term_width = 100,
+    after_help = "\
+Start here:
+  alhazen render bunny.ply                    any mesh: framed and lit by itself, to bunny.exr
+  alhazen render scene.toml -o out.exr -o out.png
+  alhazen render scene.toml --size 640x360 --samples 4 --set camera.fov=30
+  alhazen inspect scene.toml                  what it holds, what it requires, what it costs
+
+Exit codes: 0 done, 1 the render failed, 2 bad input or usage, 130 interrupted (a valid picture is on disk).
+The scene format is described in docs/scene.md."
+)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Render a scene (.toml) or a bare mesh (.ply, .obj, .stl) to EXR or PNG
+    Render(RenderArgs),
+    /// Say what a scene holds, what it requires of the renderer, and what it costs to build
+    Inspect(InspectArgs),
+}
+
+/// What chooses and changes a scene.
+#[derive(Debug, clap::Args)]
+pub(super) struct SceneArgs {
+    /// The scene: .toml, or a bare mesh (.ply, .obj, .stl), which is framed and lit by itself
+    pub(super) scene: PathBuf,
+
+    /// Sets any field of the scene, as in `--set camera.fov=30` or `--set objects.0.radius=2`; repeatable
+    #[arg(long, value_name = "PATH=VALUE")]
+    pub(super) set: Vec<String>,
+
+    /// The camera to use, of several named ones
+    #[arg(long, value_name = "NAME")]
+    pub(super) camera: Option<String>,
+
+    /// Picture size in pixels, as in 1920x1080
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub(super) size: Option<[u32; 2]>,
+
+    /// Samples per pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub(super) samples: Option<u32>,
+
+    /// Algorithm: `flat` shows colours without light, `direct` local illumination with shadows
+    #[arg(long, value_name = "NAME", value_parser = by_name(&IntegratorKind::ALL, IntegratorKind::name))]
+    pub(super) integrator: Option<IntegratorKind>,
+
+    /// How exact ray queries are: `fast` loses some rays at edges and far from the origin, `robust` does not
+    #[arg(long, value_name = "NAME", value_parser = by_name(&Precision::ALL, Precision::name))]
+    pub(super) precision: Option<Precision>,
+
+    /// Work put into the hierarchy
+    #[arg(long, value_name = "NAME", value_parser = by_name(&BuildQuality::ALL, BuildQuality::name))]
+    pub(super) build_quality: Option<BuildQuality>,
+
+    /// Reconstruction filter
+    #[arg(long, value_name = "NAME", value_parser = by_name(&Filter::ALL, Filter::name))]
+    pub(super) filter: Option<Filter>,
+
+    /// What answers ray queries; `brute` is an f64 loop over everything, for small scenes and comparison
+    #[arg(long, value_name = "NAME", default_value = AccelKind::ALL[0].name(),
+          value_parser = by_name(AccelKind::ALL, AccelKind::name))]
+    pub(super) accel: AccelKind,
+
+    /// Threads; all of the machine's where not given
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    pub(super) threads: Option<u16>,
+
+    /// Most memory that the hierarchy may take, as in 8G or 512M; more is an error, not swapping
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    pub(super) memory_limit: Option<u64>,
+
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(super) struct RenderArgs {
+    #[command(flatten)]
+    pub(super) scene: SceneArgs,
+
+    /// File to write, .exr or .png; repeatable. Without it: the scene's name with .exr, in this folder
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: Vec<PathBuf>,
+
+    /// Render only these pixels (x1 and y1 are not included); the EXR's data window says so
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse_crop)]
+    pub(super) crop: Option<PixelRect>,
+
+    /// Seed of all random numbers: same scene and seed, same picture
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) seed: u64,
+
+    /// Exposure of PNG files, in stops: 1 doubles the light
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(super) exposure: f32,
+
+    /// Channel type of EXR files; a picture that half cannot hold is written as float
+    #[arg(long, value_name = "TYPE", default_value = PixelType::ALL[0].name(),
+          value_parser = by_name(&PixelType::ALL, PixelType::name))]
+    pub(super) exr_type: PixelType,
+
+    /// Compression of EXR files
+    #[arg(long, value_name = "NAME", default_value = "zip",
+          value_parser = by_name(&ExrCompression::ALL, ExrCompression::name))]
+    pub(super) exr_compression: ExrCompression,
+
+    /// Write times, rays, memory and error as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) stats: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+pub(super) struct InspectArgs {
+    #[command(flatten)]
+    pub(super) scene: SceneArgs,
+}
+
+/// A parser of one of several names.
+fn by_name<T: Copy + Send + Sync + 'static>(
+    all: &'static [T],
+    name: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(all.iter().map(|&t| name(t))).map(move |text| {
+        let found = all.iter().find(|&&t| name(t) == text);
+        *found.unwrap_or_else(|| unreachable!("the parser accepts these names only"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Args::command().debug_assert();
+    }
+}

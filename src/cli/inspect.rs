@@ -1,0 +1,125 @@
+//! `alhazen inspect`: what a scene holds, what it requires, what it costs.
+
+use std::time::Instant;
+
+use super::args::InspectArgs;
+use super::report::peak_bytes;
+use super::units::{grouped, megabytes};
+use super::{Failure, Outcome, job};
+use crate::scene::Scene;
+
+/// Loads and builds the scene, and prints what it finds.
+pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
+    let args = &args.scene;
+    super::progress::catch_interrupts();
+    let clock = Instant::now();
+    let loaded = job::load(args)?;
+    let read = clock.elapsed().as_secs_f64();
+    let hash = loaded.hash;
+    let clock = Instant::now();
+    let scene = job::thread_pool(args)?.install(|| job::build(args, loaded))?;
+    let build = clock.elapsed().as_secs_f64();
+
+    println!("{}", args.scene.display());
+    for (name, value) in facts(&scene, hash) {
+        println!("  {name:<12} {value}");
+    }
+    let info = scene.accel.info();
+    println!("  {:<12} read {read:.3} s, build {build:.3} s", "cost");
+    println!(
+        "  {:<12} {} in {info}, {} at most in all",
+        "",
+        megabytes(info.bytes),
+        megabytes(peak_bytes())
+    );
+    Ok(Outcome::Done)
+}
+
+/// Name and value of every fact; what is absent is not named.
+fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
+    let r = &scene.requirements;
+    let mut facts = Vec::new();
+    let mut fact = |name, value: String| facts.push((name, value));
+    let counted = |n: u64, one: &str, many: &str| match n {
+        0 => None,
+        1 => Some(format!("1 {one}")),
+        n => Some(format!("{} {many}", grouped(n))),
+    };
+    let joined = |parts: [Option<String>; 4]| {
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") }
+    };
+    fact(
+        "geometry",
+        joined([
+            counted(r.triangles, "triangle", "triangles"),
+            counted(r.smooth_meshes, "mesh with shading normals", "meshes with shading normals"),
+            counted(r.spheres, "sphere", "spheres"),
+            None,
+        ]),
+    );
+    if r.copies > 0 {
+        let prototypes = counted(r.prototypes, "prototype", "prototypes").unwrap_or_default();
+        let copies = counted(r.copies, "copy", "copies").unwrap_or_default();
+        fact(
+            "instances",
+            format!("{copies} of {prototypes}, {} primitives drawn", grouped(r.drawn_primitives)),
+        );
+    }
+    let b = scene.bounds.translated(scene.center);
+    if b.is_empty() {
+        fact("bounds", "none: the picture shows the background".to_owned());
+    } else {
+        fact("bounds", format!("{} to {}", b.min, b.max));
+    }
+    if scene.center != glam::DVec3::ZERO {
+        fact(
+            "recentred",
+            format!("by {}: coordinates are far compared with their extent", scene.center),
+        );
+    }
+    fact(
+        "lights",
+        if r.lit_automatically {
+            "none: lit from the camera's side".to_owned()
+        } else {
+            joined([
+                counted(r.point_lights, "point light", "point lights"),
+                counted(
+                    r.lecture_lights,
+                    "point light without falloff",
+                    "point lights without falloff",
+                ),
+                counted(r.directional_lights, "directional light", "directional lights"),
+                (!scene.ambient.is_black()).then(|| "ambient light".to_owned()),
+            ])
+        },
+    );
+    let s = &scene.settings;
+    let mut required = vec![format!("integrator `{}`", s.integrator.name())];
+    if r.shadow_rays {
+        required.push("shadow rays, as there are lights".to_owned());
+    }
+    if r.specular_materials > 0 {
+        required.push(format!("highlights, as {} materials have them", r.specular_materials));
+    }
+    if r.spheres > 0 {
+        required.push("user geometry, as there are spheres".to_owned());
+    }
+    if r.copies > 0 {
+        required.push("a second level, as there are instances".to_owned());
+    }
+    fact("requires", required.join("; "));
+    fact(
+        "picture",
+        format!(
+            "{} x {}, {} samples, filter `{}`",
+            scene.size[0],
+            scene.size[1],
+            s.samples,
+            s.filter.name()
+        ),
+    );
+    fact("hash", format!("{hash:016x}"));
+    facts
+}

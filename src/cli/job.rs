@@ -1,0 +1,219 @@
+//! What the flags of `render` mean together: conflicts found before any work, then load, build,
+//! render, write.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::args::{RenderArgs, SceneArgs};
+use super::progress::{Progress, catch_interrupts, interrupted};
+use super::{Failure, Outcome, report};
+use crate::accel::{AccelError, BuildOptions};
+use crate::film::PixelRect;
+use crate::io::{
+    ExrOptions, LoadOptions, LoadedScene, PixelType, WriteError, check_writable, load_scene,
+    write_exr, write_png,
+};
+use crate::render::{RenderJob, Rendered, render as run_render};
+use crate::scene::{Scene, SceneError};
+
+/// Seconds of each phase; `total` counts from the start of the program.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub(super) struct Phases {
+    pub(super) read: f64,
+    pub(super) build: f64,
+    pub(super) render: f64,
+    pub(super) write: f64,
+    pub(super) total: f64,
+}
+
+/// A file to write.
+struct Output {
+    path: PathBuf,
+    format: Format,
+}
+
+enum Format {
+    Exr,
+    Png,
+}
+
+/// `alhazen render`.
+pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failure> {
+    let quiet = args.scene.quiet;
+    let outputs = outputs(args)?;
+    if !args.exposure.is_finite() {
+        return Err(Failure::BadInput("--exposure must be a finite number".to_owned()));
+    }
+    for path in outputs.iter().map(|o| &o.path).chain(&args.stats) {
+        check_writable(path).map_err(|e| Failure::BadInput(e.to_string()))?;
+    }
+    catch_interrupts();
+    let mut phases = Phases::default();
+    let clock = Instant::now();
+    let loaded = load(&args.scene)?;
+    phases.read = clock.elapsed().as_secs_f64();
+    let hash = loaded.hash;
+    let crop = args.crop.map(|crop| check_crop(crop, loaded.scene.image.size)).transpose()?;
+
+    let pool = thread_pool(&args.scene)?;
+    let clock = Instant::now();
+    let scene = pool.install(|| build(&args.scene, loaded))?;
+    phases.build = clock.elapsed().as_secs_f64();
+
+    let job = RenderJob { crop, seed: args.seed };
+    let clock = Instant::now();
+    let progress = Progress::new(quiet, "render");
+    let rendered = pool.install(|| run_render(&scene, &job, &progress));
+    progress.finish();
+    phases.render = clock.elapsed().as_secs_f64();
+
+    let clock = Instant::now();
+    let accel = scene.accel.info();
+    let attributes = report::attributes(&scene, hash, &job, &rendered, &accel);
+    for output in &outputs {
+        let path = &output.path;
+        let failed = |e: WriteError| Failure::Failed(e.to_string());
+        match output.format {
+            Format::Exr => {
+                let options =
+                    ExrOptions { pixel_type: args.exr_type, compression: args.exr_compression };
+                let used = pool
+                    .install(|| write_exr(path, &rendered.film, &attributes, &options))
+                    .map_err(failed)?;
+                if used != args.exr_type && !quiet {
+                    warn(&format!(
+                        "{}: written as {}, as half ends at 65504",
+                        path.display(),
+                        PixelType::Float.name()
+                    ));
+                }
+            }
+            Format::Png => write_png(path, &rendered.film, args.exposure).map_err(failed)?,
+        }
+    }
+    phases.write = clock.elapsed().as_secs_f64();
+    phases.total = start.elapsed().as_secs_f64();
+
+    if let Some(path) = &args.stats {
+        report::write_stats(path, &phases, &rendered, &accel)?;
+    }
+    if !quiet {
+        tell_non_finite(&rendered);
+        report::print_table(&phases, &rendered, &accel);
+        for output in &outputs {
+            println!("{:>10}  {}", "wrote", output.path.display());
+        }
+    }
+    if rendered.interrupted {
+        eprintln!("alhazen: interrupted; the picture holds the tiles that were finished");
+        return Ok(Outcome::Interrupted);
+    }
+    Ok(Outcome::Done)
+}
+
+/// Loads the scene and applies the flags that stand for its fields. Warnings are printed.
+pub(super) fn load(args: &SceneArgs) -> Result<LoadedScene, Failure> {
+    let options = LoadOptions { set: args.set.clone(), camera: args.camera.clone() };
+    let mut loaded =
+        load_scene(&args.scene, &options).map_err(|e| Failure::BadInput(e.to_string()))?;
+    if !args.quiet {
+        loaded.warnings.iter().for_each(|warning| warn(warning));
+    }
+    let scene = &mut loaded.scene;
+    let settings = &mut scene.settings;
+    scene.image.size = args.size.unwrap_or(scene.image.size);
+    settings.samples = args.samples.unwrap_or(settings.samples);
+    settings.integrator = args.integrator.unwrap_or(settings.integrator);
+    settings.precision = args.precision.unwrap_or(settings.precision);
+    settings.build_quality = args.build_quality.unwrap_or(settings.build_quality);
+    settings.filter = args.filter.unwrap_or(settings.filter);
+    Ok(loaded)
+}
+
+/// Builds the scene, showing progress.
+pub(super) fn build(args: &SceneArgs, loaded: LoadedScene) -> Result<Scene, Failure> {
+    let options = BuildOptions {
+        kind: args.accel,
+        threads: args.threads.map(usize::from),
+        memory_limit: args.memory_limit,
+        ..BuildOptions::default()
+    };
+    if interrupted() {
+        return Err(Failure::Interrupted);
+    }
+    let progress = Progress::new(args.quiet, "build");
+    let scene = Scene::build(loaded.scene, &options, &|done| progress.report(done, 0));
+    progress.finish();
+    scene.map_err(|errors| match errors.as_slice() {
+        [SceneError::Accel(AccelError::Interrupted)] => Failure::Interrupted,
+        [SceneError::Accel(error)] => Failure::Failed(error.to_string()),
+        errors => {
+            let lines: Vec<String> = errors.iter().map(ToString::to_string).collect();
+            Failure::BadInput(lines.join("\n"))
+        }
+    })
+}
+
+/// The threads that everything runs on.
+pub(super) fn thread_pool(args: &SceneArgs) -> Result<rayon::ThreadPool, Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.map_or(0, usize::from))
+        .build()
+        .map_err(|e| Failure::Failed(format!("cannot start threads: {e}")))
+}
+
+fn outputs(args: &RenderArgs) -> Result<Vec<Output>, Failure> {
+    let paths = if args.output.is_empty() {
+        let stem = args.scene.scene.file_stem().unwrap_or_else(|| "picture".as_ref());
+        vec![Path::new(stem).with_extension("exr")]
+    } else {
+        args.output.clone()
+    };
+    let output = |path: PathBuf| {
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let format = match extension.as_str() {
+            "exr" => Format::Exr,
+            "png" => Format::Png,
+            _ => {
+                let message =
+                    format!("{}: unknown kind of picture; accepted: .exr, .png", path.display());
+                return Err(Failure::BadInput(message));
+            }
+        };
+        Ok(Output { path, format })
+    };
+    paths.into_iter().map(output).collect()
+}
+
+fn check_crop(crop: PixelRect, size: [u32; 2]) -> Result<PixelRect, Failure> {
+    if crop.x1 <= size[0] && crop.y1 <= size[1] {
+        return Ok(crop);
+    }
+    let PixelRect { x0, y0, x1, y1 } = crop;
+    Err(Failure::BadInput(format!(
+        "--crop {x0},{y0},{x1},{y1} reaches beyond the picture of {}x{}",
+        size[0], size[1]
+    )))
+}
+
+pub(super) fn warn(text: &str) {
+    eprintln!("alhazen: warning: {text}");
+}
+
+fn tell_non_finite(rendered: &Rendered) {
+    let found = &rendered.non_finite;
+    if found.count > 0 {
+        let first: Vec<String> = found
+            .first
+            .iter()
+            .map(|([x, y], sample)| format!("sample {sample} of pixel {x},{y}"))
+            .collect();
+        warn(&format!(
+            "{} samples were NaN or infinite and left out: {}",
+            found.count,
+            first.join("; ")
+        ));
+    }
+}

@@ -1,0 +1,109 @@
+//! Progress: a bar on a terminal, a line now and then elsewhere, nothing when asked to be quiet.
+
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::render::Observer;
+
+/// Set by Ctrl-C and SIGTERM.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+/// Seconds between lines where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// From now on Ctrl-C and SIGTERM ask for an end; a second one ends the program at once.
+pub(super) fn catch_interrupts() {
+    let caught = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    if let Err(error) = caught {
+        eprintln!("alhazen: warning: Ctrl-C will end the program at once: {error}");
+    }
+}
+
+/// Whether an end was asked for.
+pub(super) fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}
+
+/// Shows how one phase of the work goes.
+pub(super) struct Progress {
+    display: Display,
+    phase: &'static str,
+    start: Instant,
+}
+
+enum Display {
+    Quiet,
+    Bar(ProgressBar),
+    /// When the last line was written.
+    Lines(Mutex<Instant>),
+}
+
+impl Progress {
+    pub(super) fn new(quiet: bool, phase: &'static str) -> Self {
+        let display = if quiet {
+            Display::Quiet
+        } else if std::io::stderr().is_terminal() {
+            let style = ProgressStyle::with_template(
+                "{prefix:>9} [{bar:32}] {percent:>3} %  {elapsed}, {eta} left  {msg}",
+            )
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+            let bar =
+                ProgressBar::new(STEPS).with_style(style.progress_chars("=> ")).with_prefix(phase);
+            Display::Bar(bar)
+        } else {
+            Display::Lines(Mutex::new(Instant::now()))
+        };
+        Self { display, phase, start: Instant::now() }
+    }
+
+    /// A share of the phase is done. Returns whether to go on.
+    pub(super) fn report(&self, done: f64, rays: u64) -> bool {
+        let seconds = self.start.elapsed().as_secs_f64();
+        let rate = || {
+            if rays == 0 {
+                String::new()
+            } else {
+                format!("{:.1} Mrays/s", rays as f64 / seconds / 1e6)
+            }
+        };
+        match &self.display {
+            Display::Quiet => {}
+            Display::Bar(bar) => {
+                bar.set_position((done * STEPS as f64) as u64);
+                bar.set_message(rate());
+            }
+            Display::Lines(last) => {
+                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+                if last.elapsed() > LINE_EVERY {
+                    *last = Instant::now();
+                    let left = if done > 0.0 { seconds / done - seconds } else { f64::INFINITY };
+                    eprintln!("{}: {:.0} %, {left:.0} s left {}", self.phase, 100.0 * done, rate());
+                }
+            }
+        }
+        !interrupted()
+    }
+
+    pub(super) fn finish(&self) {
+        if let Display::Bar(bar) = &self.display {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Observer for Progress {
+    fn progress(&self, done: f64, rays: u64) -> bool {
+        self.report(done, rays)
+    }
+}

@@ -1,0 +1,177 @@
+//! What a render says at the end: a table for people, JSON for programs, attributes for the EXR.
+
+use std::io::Write;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::units::{grouped, megabytes};
+use super::{Failure, job::Phases};
+use crate::accel::AccelInfo;
+use crate::io::{Attribute, AttributeValue};
+use crate::render::{RenderJob, Rendered};
+use crate::scene::{Epsilon, Scene};
+
+/// The fields of `--stats`; their names are stable.
+#[derive(Debug, Serialize)]
+struct Stats<'a> {
+    seconds: &'a Phases,
+    rays: Rays,
+    memory: Memory,
+    samples: u32,
+    /// Estimated relative sampling error; null at one sample a pixel.
+    error: Option<f64>,
+    /// Why the render ended: "samples" or "interrupted".
+    stop: &'static str,
+    non_finite_samples: u64,
+    accelerator: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Rays {
+    camera: u64,
+    shadow: u64,
+    reflection: u64,
+    refraction: u64,
+    diffuse: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct Memory {
+    peak_bytes: u64,
+    accelerator_bytes: u64,
+}
+
+/// Writes the statistics as JSON.
+pub(super) fn write_stats(
+    path: &Path,
+    phases: &Phases,
+    rendered: &Rendered,
+    accel: &AccelInfo,
+) -> Result<(), Failure> {
+    let stats = Stats {
+        seconds: phases,
+        rays: Rays {
+            camera: rendered.rays.camera,
+            shadow: rendered.rays.shadow,
+            reflection: 0,
+            refraction: 0,
+            diffuse: 0,
+        },
+        memory: Memory { peak_bytes: peak_bytes(), accelerator_bytes: accel.bytes },
+        samples: rendered.samples,
+        error: rendered.film.relative_error(),
+        stop: if rendered.interrupted { "interrupted" } else { "samples" },
+        non_finite_samples: rendered.non_finite.count,
+        accelerator: accel.to_string(),
+    };
+    let text = serde_json::to_string_pretty(&stats)
+        .map_err(|e| Failure::Failed(format!("{}: {e}", path.display())))?;
+    crate::io::write_text(path, &(text + "\n")).map_err(|e| Failure::Failed(e.to_string()))
+}
+
+/// Prints the closing table.
+pub(super) fn print_table(phases: &Phases, rendered: &Rendered, accel: &AccelInfo) {
+    let film = &rendered.film;
+    let mut out = std::io::stdout().lock();
+    let mut line = |name: &str, value: String| {
+        // Nobody listens any more: not worth an error.
+        let _ = writeln!(out, "{name:>10}  {value}");
+    };
+    let (w, h) = (film.window.width(), film.window.height());
+    line("picture", format!("{w} x {h}, {} per pixel", plural(rendered.samples, "sample")));
+    line(
+        "seconds",
+        format!(
+            "read {:.3}, build {:.3}, render {:.3}, write {:.3}, total {:.3}",
+            phases.read, phases.build, phases.render, phases.write, phases.total
+        ),
+    );
+    let rays = rendered.rays;
+    line(
+        "rays",
+        format!(
+            "{} camera, {} shadow: {:.1} Mrays/s",
+            grouped(rays.camera),
+            grouped(rays.shadow),
+            rays.total() as f64 / phases.render.max(1e-9) / 1e6
+        ),
+    );
+    line(
+        "memory",
+        format!("{} at most, of it {} in {accel}", megabytes(peak_bytes()), megabytes(accel.bytes)),
+    );
+    line(
+        "error",
+        match film.relative_error() {
+            Some(error) => {
+                format!("{:.2} % of sampling (relative, root mean square)", 100.0 * error)
+            }
+            None => "unknown: one sample a pixel gives no estimate".to_owned(),
+        },
+    );
+}
+
+fn plural(n: u32, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
+
+/// What the header of an EXR says of how the picture was made. Nothing that changes from run to run.
+pub(super) fn attributes(
+    scene: &Scene,
+    scene_hash: u64,
+    job: &RenderJob,
+    rendered: &Rendered,
+    accel: &AccelInfo,
+) -> Vec<Attribute> {
+    let text = |name, value: String| Attribute { name, value: AttributeValue::Text(value) };
+    let integer = |name, value: u32| {
+        let value = AttributeValue::Integer(i32::try_from(value).unwrap_or(i32::MAX));
+        Attribute { name, value }
+    };
+    let settings = &scene.settings;
+    let mut list = vec![
+        text("alhazen.version", env!("CARGO_PKG_VERSION").to_owned()),
+        text("alhazen.scene", format!("{scene_hash:016x}")),
+        text("alhazen.seed", job.seed.to_string()),
+        integer("alhazen.samples", rendered.samples),
+        text("alhazen.integrator", settings.integrator.name().to_owned()),
+        text("alhazen.filter", settings.filter.name().to_owned()),
+        text("alhazen.precision", settings.precision.name().to_owned()),
+        text("alhazen.accel", accel.name.clone()),
+        text("alhazen.isa", accel.isa.to_owned()),
+        integer("alhazen.packetWidth", accel.packet_width as u32),
+        text("alhazen.bias", biasing_options(scene)),
+        Attribute {
+            name: "alhazen.origin",
+            value: AttributeValue::Vector(scene.center.as_vec3().to_array()),
+        },
+    ];
+    if let Some(error) = rendered.film.relative_error() {
+        list.push(Attribute { name: "alhazen.error", value: AttributeValue::Float(error) });
+    }
+    if rendered.interrupted {
+        list.push(text("alhazen.stop", "interrupted".to_owned()));
+    }
+    list
+}
+
+/// The options that shift the picture systematically, which the stated error does not cover.
+fn biasing_options(scene: &Scene) -> String {
+    let mut list = vec![format!("precision={}", scene.settings.precision.name())];
+    if let Epsilon::Fixed(epsilon) = scene.settings.epsilon {
+        list.push(format!("epsilon={epsilon}"));
+    }
+    if !scene.settings.shadows {
+        list.push("shadows=false".to_owned());
+    }
+    list.join(" ")
+}
+
+/// The most memory that this process has held, from the kernel; 0 where it does not say.
+pub(super) fn peak_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kilobytes = line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<u64>().ok());
+    kilobytes.unwrap_or(0) * 1024
+}

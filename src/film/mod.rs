@@ -1,0 +1,123 @@
+//! The film: what samples add up to. Sums in f64 by a fixed tree, the error that follows from them,
+//! and the reconstruction filter. It knows pixels and samples, not scenes, and no file formats.
+
+mod accumulate;
+mod filter;
+
+pub use accumulate::{BLOCK_LANES, BlockAccumulator, BlockPixels};
+pub use filter::{Filter, FilterSample, FilterTable};
+
+use crate::color::Rgb;
+
+/// A rectangle of pixels: `x0 ≤ x < x1`, `y0 ≤ y < y1`, y down.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "said above")]
+pub struct PixelRect {
+    pub x0: u32,
+    pub y0: u32,
+    pub x1: u32,
+    pub y1: u32,
+}
+
+impl PixelRect {
+    /// The whole picture of `width` × `height`.
+    pub const fn whole([width, height]: [u32; 2]) -> Self {
+        Self { x0: 0, y0: 0, x1: width, y1: height }
+    }
+
+    /// Pixels across.
+    pub const fn width(&self) -> u32 {
+        self.x1.saturating_sub(self.x0)
+    }
+
+    /// Pixels down.
+    pub const fn height(&self) -> u32 {
+        self.y1.saturating_sub(self.y0)
+    }
+
+    /// Pixels in all.
+    pub const fn area(&self) -> usize {
+        self.width() as usize * self.height() as usize
+    }
+
+    /// Whether the pixel `(x, y)` is inside.
+    #[inline]
+    pub const fn contains(&self, x: u32, y: u32) -> bool {
+        self.x0 <= x && x < self.x1 && self.y0 <= y && y < self.y1
+    }
+
+    /// What both cover.
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self {
+            x0: self.x0.max(other.x0),
+            y0: self.y0.max(other.y0),
+            x1: self.x1.min(other.x1),
+            y1: self.y1.min(other.y1),
+        }
+    }
+}
+
+/// A finished picture: the mean radiance of every pixel, and the variance of that mean.
+#[derive(Debug, Clone)]
+pub struct Film {
+    /// Size of the whole picture, in pixels.
+    pub size: [u32; 2],
+    /// The part of it that this film holds (the crop).
+    pub window: PixelRect,
+    /// Mean radiance, row by row over the window.
+    pub mean: Vec<Rgb>,
+    /// Estimated variance of that mean, in the same order; none where one sample a pixel gives no estimate.
+    pub variance: Option<Vec<Rgb>>,
+}
+
+impl Film {
+    /// A black film; with room for variances where `with_variance`.
+    pub fn new(size: [u32; 2], window: PixelRect, with_variance: bool) -> Self {
+        let black = vec![Rgb::BLACK; window.area()];
+        Self { size, window, variance: with_variance.then(|| black.clone()), mean: black }
+    }
+
+    /// Writes the pixels of a block that lie inside the window.
+    pub fn put(&mut self, block: &BlockPixels) {
+        for (lane, (&mean, &variance)) in block.mean.iter().zip(&block.variance).enumerate() {
+            let [x, y] = [block.origin[0] + lane as u32 % 4, block.origin[1] + lane as u32 / 4];
+            if let Some(i) = self.index(x, y) {
+                self.mean[i] = mean;
+                if let Some(plane) = &mut self.variance {
+                    plane[i] = variance;
+                }
+            }
+        }
+    }
+
+    /// The mean of the pixel at absolute coordinates; none outside the window.
+    pub fn pixel(&self, x: u32, y: u32) -> Option<Rgb> {
+        self.index(x, y).map(|i| self.mean[i])
+    }
+
+    fn index(&self, x: u32, y: u32) -> Option<usize> {
+        let w = &self.window;
+        w.contains(x, y).then(|| (y - w.y0) as usize * w.width() as usize + (x - w.x0) as usize)
+    }
+
+    /// The relative sampling error of the picture: the root of the mean over pixels and channels of
+    /// Var\[mean\] / (mean² + ε), with ε = 0.01 · (mean luminance)². None without variances.
+    pub fn relative_error(&self) -> Option<f64> {
+        let variance = self.variance.as_ref()?;
+        let n = self.mean.len().max(1) as f64;
+        let luminance = self.mean.iter().map(|c| f64::from(c.luminance())).sum::<f64>() / n;
+        let epsilon = 0.01 * luminance * luminance;
+        let sum: f64 = self
+            .mean
+            .iter()
+            .zip(variance)
+            .flat_map(|(m, v)| m.to_array().into_iter().zip(v.to_array()))
+            .map(|(m, v)| {
+                let (m, v) = (f64::from(m), f64::from(v));
+                // A black picture has no error, rather than 0/0.
+                if v == 0.0 { 0.0 } else { v / (m * m + epsilon) }
+            })
+            .sum();
+        Some((sum / (3.0 * n)).sqrt())
+    }
+}

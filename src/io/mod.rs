@@ -1,0 +1,35 @@
+//! Files: scenes and meshes in, pictures out. One file per format.
+//!
+//! It turns whatever a person wrote into a [`crate::scene::SceneDesc`], reading every file that a
+//! scene names, and writes a finished [`crate::film::Film`]. It never sees an integrator, and prints
+//! nothing: what should be told comes back as data.
+//!
+//! Numbers from files are suspects: nothing is allocated in proportion to a number that a file merely
+//! claims. A file that is written appears whole under its name, or not at all.
+
+mod distinct;
+mod document;
+mod error;
+mod exr;
+mod fields;
+mod mesh;
+mod mistakes;
+mod obj;
+mod output;
+mod ply;
+mod png;
+mod polygon;
+mod scene_file;
+mod scene_toml;
+mod source;
+mod stl;
+mod text;
+mod transforms;
+
+pub use error::{ReadError, WriteError};
+pub use exr::{ExrCompression, ExrOptions, PixelType, write_exr};
+pub use mesh::{MeshFile, read_mesh};
+pub use mistakes::{Mistake, Mistakes};
+pub use output::{Attribute, AttributeValue, check_writable, write_text};
+pub use png::write_png;
+pub use scene_file::{LoadError, LoadOptions, LoadedScene, load_scene};

@@ -1,0 +1,111 @@
+//! Loading whatever a user names as a scene: our TOML, or a bare mesh.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+
+use super::document::Document;
+use super::error::ReadError;
+use super::mistakes::Mistakes;
+use super::scene_toml::{Interpreted, interpret};
+use crate::scene::{SceneDesc, ShapeDesc};
+
+/// What the command line adds to a scene file.
+#[derive(Debug, Clone, Default)]
+pub struct LoadOptions {
+    /// `path.to.field=value`, applied in order.
+    pub set: Vec<String>,
+    /// Which of several cameras.
+    pub camera: Option<String>,
+}
+
+/// A scene as loaded.
+#[derive(Debug)]
+pub struct LoadedScene {
+    /// What was written.
+    pub scene: SceneDesc,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+    /// Hash of everything that was read: same hash, same scene.
+    pub hash: u64,
+}
+
+/// Why a scene cannot be loaded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// It has mistakes.
+    #[error(transparent)]
+    Mistakes(#[from] Mistakes),
+}
+
+/// Loads a scene (`.toml`) or a bare mesh (`.ply`, `.obj`, `.stl`), with every file that it names.
+///
+/// # Errors
+/// [`LoadError`] with every mistake of a scene file at once.
+pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, LoadError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let (mut document, folder, text) = match extension.as_str() {
+        "toml" => {
+            let bytes = std::fs::read(path).map_err(|e| ReadError::io(path, "read", e))?;
+            let text = String::from_utf8(bytes).map_err(|e| {
+                let offset = e.utf8_error().valid_up_to() as u64;
+                ReadError::byte(path, offset, "not UTF-8, as TOML must be")
+            })?;
+            let document = Document::parse(&path.to_string_lossy(), &text)?;
+            (document, path.parent().unwrap_or(Path::new("")), text)
+        }
+        "ply" | "obj" | "stl" => {
+            let name = path
+                .to_str()
+                .ok_or_else(|| ReadError::file(path, "the name of a mesh file must be UTF-8"))?;
+            (Document::of_mesh(name), Path::new(""), String::new())
+        }
+        _ => {
+            let message = "unknown kind of scene; accepted: .toml, .ply, .obj, .stl";
+            return Err(ReadError::file(path, message).into());
+        }
+    };
+    let mistakes: Vec<_> = options.set.iter().filter_map(|set| document.set(set).err()).collect();
+    if !mistakes.is_empty() {
+        return Err(Mistakes(mistakes).into());
+    }
+    let Interpreted { scene, warnings } = interpret(&document, folder, options.camera.as_deref())?;
+    let hash = hash(&scene, &text, options);
+    Ok(LoadedScene { scene, warnings, hash })
+}
+
+/// Hash of the text, the options, and all meshes and transforms, whatever file they came from.
+fn hash(scene: &SceneDesc, text: &str, options: &LoadOptions) -> u64 {
+    const PART: usize = 1 << 20;
+    let mut total = Xxh3::new();
+    total.update(text.as_bytes());
+    for option in options.set.iter().chain(&options.camera) {
+        total.update(option.as_bytes());
+        total.update(&[0]);
+    }
+    let objects = scene.prototypes.iter().flat_map(|p| &p.objects).chain(&scene.objects);
+    for object in objects {
+        if let ShapeDesc::Instances { transforms, .. } = &object.shape {
+            for transform in transforms {
+                total.update(bytemuck::cast_slice(&transform.to_cols_array()));
+            }
+        }
+    }
+    for mesh in &scene.meshes {
+        let mut add = |bytes: &[u8]| {
+            let parts: Vec<u64> = bytes.par_chunks(PART).map(xxh3_64).collect();
+            total.update(&(bytes.len() as u64).to_le_bytes());
+            parts.iter().for_each(|part| total.update(&part.to_le_bytes()));
+        };
+        add(bytemuck::cast_slice(mesh.positions.as_flat()));
+        add(bytemuck::cast_slice(&mesh.triangles));
+        add(bytemuck::cast_slice(mesh.normals.as_deref().map_or(&[][..], |n| n)));
+        add(bytemuck::cast_slice(&mesh.origin.to_array()));
+    }
+    total.digest()
+}

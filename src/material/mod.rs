@@ -1,0 +1,147 @@
+//! Materials: how a surface answers light. Each model with its formula; no lights, no rays.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::Vec3;
+
+use crate::color::Rgb;
+
+/// How a surface scatters light.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Material {
+    /// Lambert's: the same radiance in all directions.
+    Diffuse {
+        /// Fraction of light that leaves again, in [0, 1].
+        reflectance: Rgb,
+    },
+    /// The lecture's shading equation.
+    Phong(Phong),
+}
+
+/// Ambient, diffuse and specular coefficients of the lecture's shading equation:
+///
+/// I = k_a·I_a + Σ_lights (k_d·(n·l) + k_s·cosⁿα)·I
+///
+/// Empirical: it is neither reciprocal nor bounded in energy.
+/// Source: Phong, *Illumination for Computer Generated Pictures*, CACM 18(6) 1975; Blinn, SIGGRAPH 1977.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Phong {
+    /// k_a.
+    pub ambient: Rgb,
+    /// k_d.
+    pub diffuse: Rgb,
+    /// k_s.
+    pub specular: Rgb,
+    /// n, the sharpness of the highlight, ≥ 0.
+    pub shininess: f32,
+    /// What the highlight's angle α is measured between.
+    pub model: PhongModel,
+}
+
+/// The two ways to measure a highlight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PhongModel {
+    /// cos α = n·h, h half-way between light and viewer (Blinn).
+    #[default]
+    BlinnPhong,
+    /// cos α = r·v, r the mirrored direction of the light (Phong).
+    Phong,
+}
+
+impl Material {
+    /// Radiance that leaves towards `wo` for each unit of irradiance on a plane facing `wi`, in 1/sr.
+    /// The cosine of the angle of incidence is included.
+    ///
+    /// - `n`: shading normal; `wo`, `wi`: towards viewer and light. All of unit length, all on the
+    ///   same side of the surface; zero where `wi` is behind `n`.
+    #[inline]
+    pub fn response(&self, n: Vec3, wo: Vec3, wi: Vec3) -> Rgb {
+        let cos_theta = n.dot(wi);
+        // Also refuses NaN.
+        if !(cos_theta > 0.0) {
+            return Rgb::BLACK;
+        }
+        match self {
+            Self::Diffuse { reflectance } => *reflectance * (cos_theta * FRAC_1_PI),
+            Self::Phong(phong) => {
+                let diffuse = phong.diffuse * cos_theta;
+                if phong.specular.is_black() {
+                    return diffuse * FRAC_1_PI;
+                }
+                let cos_alpha = match phong.model {
+                    PhongModel::BlinnPhong => n.dot((wi + wo).normalize_or_zero()),
+                    PhongModel::Phong => (n * (2.0 * cos_theta) - wi).dot(wo),
+                };
+                let highlight = cos_alpha.max(0.0).powf(phong.shininess);
+                (diffuse + phong.specular * highlight) * FRAC_1_PI
+            }
+        }
+    }
+
+    /// What ambient light of radiance 1 from everywhere leaves as.
+    pub fn ambient(&self) -> Rgb {
+        match self {
+            Self::Diffuse { reflectance } => *reflectance,
+            Self::Phong(phong) => phong.ambient,
+        }
+    }
+
+    /// The colour of the surface without light: what the `flat` integrator shows.
+    pub fn albedo(&self) -> Rgb {
+        match self {
+            Self::Diffuse { reflectance } => *reflectance,
+            Self::Phong(phong) => phong.diffuse,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::PI;
+
+    fn phong(model: PhongModel) -> Material {
+        Material::Phong(Phong {
+            ambient: Rgb::splat(0.1),
+            diffuse: Rgb::splat(0.5),
+            specular: Rgb::splat(0.25),
+            shininess: 8.0,
+            model,
+        })
+    }
+
+    #[test]
+    fn the_lectures_equation() {
+        // Light 60° from the normal, viewer 30° on the other side: mirrored light and viewer are 30°
+        // apart, the half vector is 15° off the normal.
+        let at =
+            |degrees: f32| Vec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
+        let (n, l, v) = (Vec3::Y, at(60.0), at(-30.0));
+        let cos = |degrees: f32| degrees.to_radians().cos();
+        for (model, alpha) in [(PhongModel::Phong, 30.0), (PhongModel::BlinnPhong, 15.0)] {
+            let expected = (0.5 * cos(60.0) + 0.25 * cos(alpha).powi(8)) / PI;
+            let got = phong(model).response(n, v, l).r;
+            assert!((got - expected).abs() < 1e-6, "{model:?}: {got} against {expected}");
+        }
+        assert!(phong(PhongModel::Phong).response(n, v, -l).is_black(), "light from behind");
+    }
+
+    #[test]
+    fn a_diffuse_surface_returns_its_reflectance() {
+        // The integral of the response over the hemisphere of viewers, times cos: reflectance · cos θi.
+        let material = Material::Diffuse { reflectance: Rgb::splat(0.8) };
+        let steps = 2000;
+        let wi = Vec3::new(0.6, 0.8, 0.0);
+        let flux: f64 = (0..steps)
+            .map(|i| {
+                let theta = (f64::from(i) + 0.5) / f64::from(steps) * std::f64::consts::FRAC_PI_2;
+                let wo = Vec3::new(theta.sin() as f32, theta.cos() as f32, 0.0);
+                let radiance = f64::from(material.response(Vec3::Y, wo, wi).r);
+                radiance * theta.cos() * theta.sin() * 2.0 * std::f64::consts::PI
+            })
+            .sum::<f64>()
+            * std::f64::consts::FRAC_PI_2
+            / f64::from(steps);
+        assert!((flux - 0.8 * 0.8).abs() < 1e-5, "{flux}");
+    }
+}

@@ -1,0 +1,231 @@
+//! Cuts the film into tiles, runs an integrator over them on all threads, adds the samples up, and
+//! stops where it is told to. It owns threads and order; it knows neither files nor terminals, and
+//! tells whoever asks through an [`Observer`].
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use crate::accel::{Accel, LANES, RayBlock, RayQuery};
+use crate::film::{BlockAccumulator, Film, FilterTable, PixelRect};
+use crate::integrator::{Direct, Flat, Integrator, RayCounts};
+use crate::sampler::{Dimensions, Sampler};
+use crate::scene::{IntegratorKind, Scene};
+
+/// Pixels of a tile's side: a multiple of the block's 4.
+const TILE: u32 = 32;
+
+/// Non-finite samples that are told one by one; further ones are only counted.
+const NON_FINITE_TOLD: usize = 8;
+
+/// What to render of a scene.
+#[derive(Debug, Clone, Default)]
+pub struct RenderJob {
+    /// The part of the picture; all of it where not given.
+    pub crop: Option<PixelRect>,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// Hears how a render goes. Called from all threads.
+pub trait Observer: Sync {
+    /// A share of the work is done, from 0 to 1. Ends the render after the running tiles by returning
+    /// false.
+    fn progress(&self, done: f64, rays: u64) -> bool {
+        let _ = (done, rays);
+        true
+    }
+}
+
+/// Hears nothing.
+impl Observer for () {}
+
+/// What came of a render.
+#[derive(Debug)]
+pub struct Rendered {
+    /// The picture. Tiles that were not reached are black.
+    pub film: Film,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Rays traced.
+    pub rays: RayCounts,
+    /// Samples that were NaN or infinite and left out.
+    pub non_finite: NonFinite,
+    /// Whether the observer ended it early.
+    pub interrupted: bool,
+}
+
+/// Samples that came out as NaN or infinite.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct NonFinite {
+    /// How many.
+    pub count: u64,
+    /// Pixel and sample number of the first few, in the picture's order.
+    pub first: Vec<([u32; 2], u32)>,
+}
+
+/// Renders a scene on the threads of the current rayon pool. The picture depends on scene, job and
+/// instruction set alone, not on the number of threads or their order.
+pub fn render(scene: &Scene, job: &RenderJob, observer: &dyn Observer) -> Rendered {
+    // Static dispatch from here on: four loops are compiled, one is run.
+    match (&scene.accel, scene.settings.integrator) {
+        #[cfg(feature = "embree")]
+        (Accel::Embree(query), IntegratorKind::Flat) => run(scene, query, &Flat, job, observer),
+        #[cfg(feature = "embree")]
+        (Accel::Embree(query), IntegratorKind::Direct) => run(scene, query, &Direct, job, observer),
+        (Accel::Brute(query), IntegratorKind::Flat) => run(scene, query, &Flat, job, observer),
+        (Accel::Brute(query), IntegratorKind::Direct) => run(scene, query, &Direct, job, observer),
+    }
+}
+
+fn run<Q: RayQuery, I: Integrator>(
+    scene: &Scene,
+    query: &Q,
+    integrator: &I,
+    job: &RenderJob,
+    observer: &dyn Observer,
+) -> Rendered {
+    let whole = PixelRect::whole(scene.size);
+    let window = job.crop.map_or(whole, |crop| crop.intersection(&whole));
+    let samples = scene.settings.samples;
+    let film = Mutex::new(Film::new(scene.size, window, samples > 1));
+    let totals = Mutex::new((RayCounts::default(), NonFinite::default()));
+    let (pixels_done, rays_done) = (AtomicU64::new(0), AtomicU64::new(0));
+    let tiles = tiles(&window);
+    let renderer = TileRenderer {
+        scene,
+        query,
+        integrator,
+        filter: FilterTable::new(scene.settings.filter),
+        seed: job.seed,
+        samples,
+        whole,
+    };
+
+    let finished = tiles.par_iter().try_for_each_init(BlockAccumulator::default, |sums, tile| {
+        let mut output = TileOutput::default();
+        renderer.render(tile, &window, sums, &mut output);
+        {
+            let mut film = film.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            output.blocks.iter().for_each(|block| film.put(block));
+        }
+        {
+            let mut totals = totals.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            totals.0.add(&output.rays);
+            totals.1.count += output.non_finite.count;
+            totals.1.first.append(&mut output.non_finite.first);
+        }
+        let area = tile.intersection(&window).area() as u64;
+        let pixels = pixels_done.fetch_add(area, Ordering::Relaxed) + area;
+        let traced = output.rays.total();
+        let rays = rays_done.fetch_add(traced, Ordering::Relaxed) + traced;
+        observer.progress(pixels as f64 / window.area() as f64, rays).then_some(())
+    });
+
+    let (rays, mut non_finite) = totals.into_inner().unwrap_or_default();
+    // Threads finish in any order; what is told does not depend on it.
+    non_finite.first.sort_unstable_by_key(|([x, y], sample)| (*y, *x, *sample));
+    non_finite.first.truncate(NON_FINITE_TOLD);
+    // A stop that was asked for with the last tile cut nothing off.
+    let interrupted = finished.is_none() && pixels_done.into_inner() < window.area() as u64;
+    let film = film.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    Rendered { film, samples, rays, non_finite, interrupted }
+}
+
+/// The tiles that touch `window`, in rows, at absolute positions: multiples of [`TILE`].
+fn tiles(window: &PixelRect) -> Vec<PixelRect> {
+    let span = |from: u32, to: u32| (from / TILE..to.div_ceil(TILE)).map(|i| i * TILE);
+    span(window.y0, window.y1)
+        .flat_map(|y0| {
+            span(window.x0, window.x1).map(move |x0| PixelRect {
+                x0,
+                y0,
+                x1: x0 + TILE,
+                y1: y0 + TILE,
+            })
+        })
+        .collect()
+}
+
+struct TileRenderer<'a, Q, I> {
+    scene: &'a Scene,
+    query: &'a Q,
+    integrator: &'a I,
+    filter: FilterTable,
+    seed: u64,
+    samples: u32,
+    whole: PixelRect,
+}
+
+#[derive(Default)]
+struct TileOutput {
+    blocks: Vec<crate::film::BlockPixels>,
+    rays: RayCounts,
+    non_finite: NonFinite,
+}
+
+impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
+    /// Renders the blocks of a tile that touch the window; whole blocks, as a packet's hits at shared
+    /// edges may depend on its neighbours, and a crop must not.
+    fn render(
+        &self,
+        tile: &PixelRect,
+        window: &PixelRect,
+        sums: &mut BlockAccumulator,
+        output: &mut TileOutput,
+    ) {
+        for y in (tile.y0..tile.y1).step_by(4) {
+            for x in (tile.x0..tile.x1).step_by(4) {
+                let block = PixelRect { x0: x, y0: y, x1: x + 4, y1: y + 4 }.intersection(window);
+                if block.width() > 0 && block.height() > 0 {
+                    self.render_block([x, y], sums, output);
+                }
+            }
+        }
+    }
+
+    fn render_block(&self, origin: [u32; 2], sums: &mut BlockAccumulator, output: &mut TileOutput) {
+        let pixel = |lane: usize| [origin[0] + lane as u32 % 4, origin[1] + lane as u32 / 4];
+        let inside = (0..LANES)
+            .filter(|&lane| {
+                let [x, y] = pixel(lane);
+                self.whole.contains(x, y)
+            })
+            .fold(0u16, |bits, lane| bits | 1 << lane);
+
+        sums.restart(0);
+        for sample in 0..self.samples {
+            let mut rays = RayBlock::empty();
+            let mut weights = [1.0; LANES];
+            for lane in (0..LANES).filter(|lane| inside >> lane & 1 == 1) {
+                let [x, y] = pixel(lane);
+                let sampler = Sampler::new(self.seed, [x, y], sample);
+                let [u, v, ..] = sampler.four(Dimensions::Camera);
+                let position = self.filter.sample([u, v]);
+                weights[lane] = position.weight;
+                let [dx, dy] = position.offset.map(f64::from);
+                let film = DVec2::new(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy);
+                if let Some(ray) = self.scene.camera.ray(film) {
+                    rays.set(lane, &ray);
+                }
+            }
+            output.rays.camera += u64::from(rays.active().count_ones());
+            let hits = self.query.intersect_block(&rays);
+            let mut radiance =
+                self.integrator.shade(self.scene, self.query, &rays, &hits, &mut output.rays);
+            for (value, weight) in radiance.iter_mut().zip(weights) {
+                *value *= weight;
+            }
+            let dropped = sums.add(sample, inside, &radiance);
+            for lane in (0..LANES).filter(|lane| dropped >> lane & 1 == 1) {
+                output.non_finite.count += 1;
+                if output.non_finite.first.len() < NON_FINITE_TOLD {
+                    output.non_finite.first.push((pixel(lane), sample));
+                }
+            }
+        }
+        output.blocks.push(sums.finish(origin));
+    }
+}

@@ -1,0 +1,274 @@
+//! What a person wrote, whatever the format: plain data, with the place it was written at.
+
+use std::fmt;
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat4, DVec3};
+
+use crate::accel::{BuildQuality, Precision};
+use crate::camera::Projection;
+use crate::color::Rgb;
+use crate::film::Filter;
+use crate::geometry::TriangleMesh;
+use crate::light::Falloff;
+use crate::material::Material;
+
+/// Where something was written: `scene.toml:12:3`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Location {
+    /// File, or the option of the command line.
+    pub source: Arc<str>,
+    /// Line and column, from 1; none where the source has no lines.
+    pub position: Option<(usize, usize)>,
+}
+
+impl Default for Location {
+    fn default() -> Self {
+        Self { source: "scene".into(), position: None }
+    }
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.position {
+            Some((line, column)) => write!(f, "{}:{line}:{column}", self.source),
+            None => f.write_str(&self.source),
+        }
+    }
+}
+
+/// A name that stands for something defined elsewhere in the scene.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    /// The name.
+    pub name: String,
+    /// Where it is used.
+    pub at: Location,
+}
+
+impl Reference {
+    /// A reference from nowhere in particular.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self { name: name.into(), at: Location::default() }
+    }
+}
+
+/// A whole scene as it was written.
+#[derive(Debug, Clone, Default)]
+pub struct SceneDesc {
+    /// Size and background.
+    pub image: ImageDesc,
+    /// The camera in use; the scene is framed automatically where there is none.
+    pub camera: Option<CameraDesc>,
+    /// How to render.
+    pub settings: RenderSettings,
+    /// Ambient radiance I_a; none where the scene does not say.
+    pub ambient: Option<Rgb>,
+    /// Materials by name.
+    pub materials: Vec<MaterialDesc>,
+    /// Meshes that objects refer to by index.
+    pub meshes: Vec<TriangleMesh>,
+    /// What is in the scene.
+    pub objects: Vec<ObjectDesc>,
+    /// What is only copied.
+    pub prototypes: Vec<PrototypeDesc>,
+    /// Lights. Where there are none, and no ambient light either, a scene is lit from the camera's side.
+    pub lights: Vec<LightDesc>,
+}
+
+/// The picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageDesc {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Radiance where nothing is hit; where not given, black, or grey for a scene that lights itself.
+    pub background: Option<Rgb>,
+}
+
+impl Default for ImageDesc {
+    fn default() -> Self {
+        Self { size: [1280, 720], background: None }
+    }
+}
+
+/// A camera.
+#[derive(Debug, Clone)]
+pub struct CameraDesc {
+    /// Where it was written.
+    pub at: Location,
+    /// Perspective or parallel. A parallel picture of height 0 is as high as the scene, where the
+    /// camera is framed automatically.
+    pub projection: Projection,
+    /// Where it stands; framed automatically where not given.
+    pub place: Option<PlaceDesc>,
+}
+
+/// Where a camera stands and looks.
+#[derive(Debug, Clone, Copy)]
+pub enum PlaceDesc {
+    /// From one point to another.
+    LookAt {
+        /// The camera.
+        eye: DVec3,
+        /// What is in the middle of the picture.
+        target: DVec3,
+        /// What is up.
+        up: DVec3,
+    },
+    /// Camera to world, looking along −Z.
+    Matrix(DMat4),
+}
+
+/// How to render.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderSettings {
+    /// The algorithm.
+    pub integrator: IntegratorKind,
+    /// Samples a pixel, ≥ 1.
+    pub samples: u32,
+    /// Bounces: 0 is the camera ray and its direct light.
+    pub max_depth: u32,
+    /// How exact ray queries are.
+    pub precision: Precision,
+    /// Whether things cast shadows.
+    pub shadows: bool,
+    /// The reconstruction filter.
+    pub filter: Filter,
+    /// How rays leave surfaces.
+    pub epsilon: Epsilon,
+    /// Work put into the hierarchy.
+    pub build_quality: BuildQuality,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            integrator: IntegratorKind::Direct,
+            samples: 16,
+            max_depth: 8,
+            precision: Precision::default(),
+            shadows: true,
+            filter: Filter::default(),
+            epsilon: Epsilon::Auto,
+            build_quality: BuildQuality::default(),
+        }
+    }
+}
+
+/// The algorithms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum IntegratorKind {
+    /// The colour of what is hit, without light.
+    Flat,
+    /// Local illumination: ambient, diffuse and specular light of each source, with shadows.
+    Direct,
+}
+
+impl IntegratorKind {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Flat, Self::Direct];
+
+    /// The name in scene files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Direct => "direct",
+        }
+    }
+}
+
+/// How a ray that leaves a surface is kept from hitting it again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Epsilon {
+    /// It starts outside the error bound of the hit point.
+    Auto,
+    /// Hits nearer than this are none: the lecture's fixed ε, in world units.
+    Fixed(f32),
+}
+
+/// A named material.
+#[derive(Debug, Clone)]
+pub struct MaterialDesc {
+    /// Its name.
+    pub name: String,
+    /// What it is.
+    pub material: Material,
+}
+
+/// Something in the scene.
+#[derive(Debug, Clone)]
+pub struct ObjectDesc {
+    /// Where it was written.
+    pub at: Location,
+    /// What it is.
+    pub shape: ShapeDesc,
+    /// Its material; a neutral grey where not given.
+    pub material: Option<Reference>,
+    /// World (or prototype) from object.
+    pub transform: DAffine3,
+}
+
+impl ObjectDesc {
+    /// An object from nowhere in particular, not transformed.
+    pub fn new(shape: ShapeDesc, material: Option<&str>) -> Self {
+        Self {
+            at: Location::default(),
+            shape,
+            material: material.map(Reference::new),
+            transform: DAffine3::IDENTITY,
+        }
+    }
+}
+
+/// The kinds of objects.
+#[derive(Debug, Clone)]
+pub enum ShapeDesc {
+    /// A mesh, by index into [`SceneDesc::meshes`].
+    Mesh(usize),
+    /// A sphere.
+    Sphere {
+        /// Centre.
+        center: DVec3,
+        /// Radius, > 0.
+        radius: f64,
+    },
+    /// Copies of a prototype, one a transform.
+    Instances {
+        /// Which prototype.
+        prototype: Reference,
+        /// World from prototype.
+        transforms: Vec<DAffine3>,
+    },
+}
+
+/// Objects that are only copied.
+#[derive(Debug, Clone)]
+pub struct PrototypeDesc {
+    /// Its name.
+    pub name: String,
+    /// Where it was written.
+    pub at: Location,
+    /// What it holds.
+    pub objects: Vec<ObjectDesc>,
+}
+
+/// A light, in world coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LightDesc {
+    /// A point.
+    Point {
+        /// Where.
+        position: DVec3,
+        /// Radiant intensity, W/sr.
+        intensity: Rgb,
+        /// Dependence on the distance.
+        falloff: Falloff,
+    },
+    /// Parallel light.
+    Directional {
+        /// The way the light travels; any length but zero.
+        direction: DVec3,
+        /// Irradiance on a plane that faces it, W/m².
+        irradiance: Rgb,
+    },
+}

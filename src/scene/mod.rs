@@ -1,0 +1,20 @@
+//! Scenes: what a person wrote ([`SceneDesc`], plain data from any file format), and what is made of
+//! it ([`Scene`], checked, recentred, built, immutable).
+//!
+//! It owns the way from names to indices, from degrees to matrices, from a hit to the point of the
+//! surface it means. It has no file formats and opens no file: tests build a [`SceneDesc`] in a few
+//! lines. It does not know how light travels.
+
+mod build;
+mod desc;
+mod place;
+mod requirements;
+mod surface;
+
+pub use build::{Scene, SceneError, UnknownName};
+pub use desc::{
+    CameraDesc, Epsilon, ImageDesc, IntegratorKind, LightDesc, Location, MaterialDesc, ObjectDesc,
+    PlaceDesc, PrototypeDesc, Reference, RenderSettings, SceneDesc, ShapeDesc,
+};
+pub use requirements::Requirements;
+pub use surface::SurfacePoint;

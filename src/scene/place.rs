@@ -1,0 +1,418 @@
+//! Where things are: objects become geometry in the space they are traced in.
+//!
+//! The world is moved by an f64 centre before anything is rounded to f32, and each prototype by its
+//! own, but only where coordinates are far compared with their extent: then f32 would lose digits
+//! that the file has. Nearer than that nothing is moved, so vertices stay the file's own, bit by bit.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat3, DVec3};
+use rayon::prelude::*;
+
+use super::build::{NameIndex, SceneError};
+use super::desc::{ObjectDesc, SceneDesc, ShapeDesc};
+use crate::accel::{Geometry, Group, InstanceSet, World, rows_from_affine};
+use crate::geometry::{Sphere, TriangleMesh};
+use crate::math::Bounds;
+
+/// The world to be traced, and what belongs to it.
+#[derive(Debug, Default)]
+pub(super) struct Placed {
+    pub(super) world: World,
+    /// Material of every geometry of the root group and of each prototype, in the world's order.
+    pub(super) root_materials: Vec<GeometryMaterials>,
+    pub(super) prototype_materials: Vec<Vec<GeometryMaterials>>,
+    /// What was subtracted from all world coordinates.
+    pub(super) center: DVec3,
+}
+
+/// The materials of one geometry.
+#[derive(Debug, Clone)]
+pub(super) enum GeometryMaterials {
+    /// One for all primitives.
+    One(u32),
+    /// One for each primitive.
+    Each(Vec<u32>),
+}
+
+impl GeometryMaterials {
+    #[inline]
+    pub(super) fn of(&self, primitive: u32) -> u32 {
+        match self {
+            Self::One(material) => *material,
+            Self::Each(materials) => materials[primitive as usize],
+        }
+    }
+}
+
+/// What a group is made of before it is moved and rounded.
+#[derive(Debug, Default)]
+struct Draft {
+    /// (mesh, material, group from mesh); `true` where this is the mesh's only use.
+    meshes: Vec<(usize, u32, DAffine3)>,
+    spheres: Vec<(Sphere, u32)>,
+    /// Copies of other drafts, by index.
+    copies: Vec<(usize, DAffine3)>,
+}
+
+/// Identity of a draft that several objects may share.
+#[derive(Debug, PartialEq, Eq, Hash)]
+enum Shared {
+    Mesh(usize, u32),
+    UnitSphere(u32),
+    Prototype(usize),
+}
+
+struct Placer<'a> {
+    materials: &'a NameIndex,
+    prototype_names: &'a NameIndex,
+    prototypes: Vec<Option<Vec<ObjectDesc>>>,
+    mesh_uses: Vec<u32>,
+    drafts: Vec<Draft>,
+    shared: HashMap<Shared, usize>,
+    errors: Vec<SceneError>,
+}
+
+/// Places everything that `desc` holds, taking its meshes and objects.
+pub(super) fn place(
+    desc: &mut SceneDesc,
+    materials: &NameIndex,
+    prototype_names: &NameIndex,
+) -> Result<Placed, Vec<SceneError>> {
+    let mut mesh_uses = vec![0; desc.meshes.len()];
+    let all = desc.prototypes.iter().flat_map(|p| &p.objects).chain(&desc.objects);
+    for object in all {
+        if let ShapeDesc::Mesh(mesh) = object.shape {
+            mesh_uses[mesh] += 1;
+        }
+    }
+    let mut placer = Placer {
+        materials,
+        prototype_names,
+        prototypes: desc
+            .prototypes
+            .iter_mut()
+            .map(|p| Some(std::mem::take(&mut p.objects)))
+            .collect(),
+        mesh_uses,
+        drafts: Vec::new(),
+        shared: HashMap::new(),
+        errors: Vec::new(),
+    };
+    let root = placer.draft(std::mem::take(&mut desc.objects));
+    // Prototypes that nothing copies are checked all the same.
+    for index in 0..placer.prototypes.len() {
+        placer.prototype(index);
+    }
+    if !placer.errors.is_empty() {
+        return Err(placer.errors);
+    }
+    let drafts = placer.drafts;
+    let mut meshes: Vec<Option<TriangleMesh>> =
+        std::mem::take(&mut desc.meshes).into_iter().map(Some).collect();
+    let mesh_bounds: Vec<Bounds> = meshes
+        .iter()
+        .map(|m| m.as_ref().map_or(Bounds::EMPTY, |m| m.bounds().translated(m.origin)))
+        .collect();
+
+    // Nested copies become one level: (draft, world from draft) for every draft that is copied.
+    let mut copies: Vec<Vec<DAffine3>> = vec![Vec::new(); drafts.len()];
+    let mut pending: Vec<(usize, DAffine3)> = root.copies.clone();
+    while let Some((draft, transform)) = pending.pop() {
+        copies[draft].push(transform);
+        pending.extend(drafts[draft].copies.iter().map(|(d, m)| (*d, transform * *m)));
+    }
+    // The stack reversed their order.
+    copies.iter_mut().for_each(|c| c.reverse());
+
+    let bounds: Vec<Bounds> = drafts.iter().map(|d| d.bounds(&mesh_bounds)).collect();
+    let mut world_bounds = root.bounds(&mesh_bounds);
+    for (b, transforms) in bounds.iter().zip(&copies) {
+        world_bounds = transforms.iter().fold(world_bounds, |w, m| w.union(b.transformed(m)));
+    }
+    let center = far_center(&world_bounds);
+
+    let mut placed = Placed { center, ..Placed::default() };
+    // A draft of nothing but copies is no group of its own.
+    let has_shapes = |d: &Draft| !d.meshes.is_empty() || !d.spheres.is_empty();
+    let used = |d: &Draft, c: &[DAffine3]| !c.is_empty() && has_shapes(d);
+    let mut uses_left = vec![0u32; meshes.len()];
+    let kept = drafts.iter().zip(&copies).filter(|(d, c)| used(d, c)).map(|(d, _)| d);
+    for (mesh, ..) in kept.chain([&root]).flat_map(|d| &d.meshes) {
+        uses_left[*mesh] += 1;
+    }
+    let mut group = |draft: &Draft, origin: DVec3| draft.group(origin, &mut meshes, &mut uses_left);
+    (placed.world.root, placed.root_materials) = group(&root, center);
+    for ((draft, transforms), bounds) in drafts.iter().zip(&copies).zip(&bounds) {
+        if !used(draft, transforms) {
+            continue;
+        }
+        let origin = far_center(bounds);
+        let (group, materials) = group(draft, origin);
+        let rows = transforms.iter().map(|m| {
+            let centred =
+                DAffine3::from_translation(-center) * *m * DAffine3::from_translation(origin);
+            rows_from_affine(&centred)
+        });
+        placed.world.sets.push(InstanceSet {
+            prototype: placed.world.prototypes.len() as u32,
+            transforms: Arc::new(rows.collect()),
+        });
+        placed.world.prototypes.push(group);
+        placed.prototype_materials.push(materials);
+    }
+    Ok(placed)
+}
+
+impl Placer<'_> {
+    fn draft(&mut self, objects: Vec<ObjectDesc>) -> Draft {
+        let mut draft = Draft::default();
+        for object in objects {
+            let material = match &object.material {
+                // Index 0 is the neutral default.
+                None => 0,
+                Some(reference) => match self.materials.find(reference, "material") {
+                    Ok(index) => index + 1,
+                    Err(error) => {
+                        self.errors.push(error);
+                        0
+                    }
+                },
+            };
+            let m = object.transform;
+            if let Err(error) = check_transform(&m, &object) {
+                self.errors.push(error);
+                continue;
+            }
+            match object.shape {
+                ShapeDesc::Mesh(mesh) if self.mesh_uses[mesh] == 1 => {
+                    draft.meshes.push((mesh, material, m));
+                }
+                ShapeDesc::Mesh(mesh) => {
+                    let only = || Draft {
+                        meshes: vec![(mesh, material, DAffine3::IDENTITY)],
+                        ..Draft::default()
+                    };
+                    let shared = self.share(Shared::Mesh(mesh, material), only);
+                    draft.copies.push((shared, m));
+                }
+                ShapeDesc::Sphere { center, radius } => match uniform_scale(&m.matrix3) {
+                    Some(scale) => {
+                        let sphere =
+                            Sphere { center: m.transform_point3(center), radius: radius * scale };
+                        draft.spheres.push((sphere, material));
+                    }
+                    // An ellipsoid is a copy of the unit sphere.
+                    None => {
+                        let unit = Sphere { center: DVec3::ZERO, radius: 1.0 };
+                        let only = || Draft { spheres: vec![(unit, material)], ..Draft::default() };
+                        let shared = self.share(Shared::UnitSphere(material), only);
+                        let place = DAffine3::from_scale_rotation_translation(
+                            DVec3::splat(radius),
+                            glam::DQuat::IDENTITY,
+                            center,
+                        );
+                        draft.copies.push((shared, m * place));
+                    }
+                },
+                ShapeDesc::Instances { ref prototype, ref transforms } => {
+                    let index = match self.prototype_names.find(prototype, "prototype") {
+                        Ok(index) => index as usize,
+                        Err(error) => {
+                            self.errors.push(error);
+                            continue;
+                        }
+                    };
+                    for (row, transform) in transforms.iter().enumerate() {
+                        if let Err(error) = check_row(transform, row, &object) {
+                            self.errors.push(error);
+                            break;
+                        }
+                    }
+                    match self.prototype(index) {
+                        Some(shared) => {
+                            draft.copies.extend(transforms.iter().map(|t| (shared, m * *t)))
+                        }
+                        None => self.errors.push(SceneError::PrototypeCycle {
+                            at: prototype.at.clone(),
+                            name: prototype.name.clone(),
+                        }),
+                    }
+                }
+            }
+        }
+        draft
+    }
+
+    fn share(&mut self, key: Shared, make: impl FnOnce() -> Draft) -> usize {
+        *self.shared.entry(key).or_insert_with(|| {
+            self.drafts.push(make());
+            self.drafts.len() - 1
+        })
+    }
+
+    /// The draft of a prototype, made on first use. None while it is being made: it contains itself.
+    fn prototype(&mut self, index: usize) -> Option<usize> {
+        if let Some(&draft) = self.shared.get(&Shared::Prototype(index)) {
+            return Some(draft);
+        }
+        let objects = self.prototypes[index].take()?;
+        let draft = self.draft(objects);
+        self.drafts.push(draft);
+        self.shared.insert(Shared::Prototype(index), self.drafts.len() - 1);
+        Some(self.drafts.len() - 1)
+    }
+}
+
+impl Draft {
+    /// The box around its own meshes and spheres, before it is moved. A mesh counts by its own box.
+    fn bounds(&self, mesh_bounds: &[Bounds]) -> Bounds {
+        let meshes = self.meshes.iter().map(|(mesh, _, m)| mesh_bounds[*mesh].transformed(m));
+        let spheres = self.spheres.iter().map(|(sphere, _)| sphere.bounds());
+        meshes.chain(spheres).fold(Bounds::EMPTY, Bounds::union)
+    }
+
+    /// The group to be traced, relative to `origin`. A mesh's last use takes its buffers.
+    fn group(
+        &self,
+        origin: DVec3,
+        meshes: &mut [Option<TriangleMesh>],
+        uses_left: &mut [u32],
+    ) -> (Group, Vec<GeometryMaterials>) {
+        let (mut geometries, mut materials) = (Vec::new(), Vec::new());
+        for &(index, material, transform) in &self.meshes {
+            uses_left[index] -= 1;
+            let slot = &mut meshes[index];
+            let mesh = if uses_left[index] == 0 { slot.take() } else { slot.clone() };
+            let Some(mesh) = mesh else { continue };
+            geometries.push(Geometry::Mesh(moved(mesh, &transform, origin)));
+            materials.push(GeometryMaterials::One(material));
+        }
+        if !self.spheres.is_empty() {
+            let moved =
+                self.spheres.iter().map(|(s, _)| Sphere { center: s.center - origin, ..*s });
+            geometries.push(Geometry::Spheres(Arc::new(moved.collect())));
+            materials.push(GeometryMaterials::Each(self.spheres.iter().map(|(_, m)| *m).collect()));
+        }
+        (Group { geometries }, materials)
+    }
+}
+
+/// The mesh in the space of its group: transformed and moved in f64, rounded once, in place.
+fn moved(mut mesh: TriangleMesh, transform: &DAffine3, group_origin: DVec3) -> TriangleMesh {
+    // group = transform · (origin + p) − group_origin
+    let m = DAffine3::from_translation(-group_origin)
+        * *transform
+        * DAffine3::from_translation(mesh.origin);
+    mesh.origin = DVec3::ZERO;
+    if m == DAffine3::IDENTITY {
+        return mesh;
+    }
+    mesh.positions.as_flat_mut().par_chunks_exact_mut(3).with_min_len(1 << 12).for_each(|p| {
+        let world = m.transform_point3(DVec3::new(p[0].into(), p[1].into(), p[2].into()));
+        p.copy_from_slice(&world.as_vec3().to_array());
+    });
+    if m.matrix3 != DMat3::IDENTITY {
+        let normal_matrix = m.matrix3.inverse().transpose();
+        if let Some(normals) = &mut mesh.normals {
+            Arc::make_mut(normals).par_iter_mut().with_min_len(1 << 12).for_each(|n| {
+                *n = (normal_matrix * DVec3::from(n.map(f64::from)))
+                    .normalize_or_zero()
+                    .as_vec3()
+                    .to_array();
+            });
+        }
+        // A mirrored mesh stays right side out: counter-clockwise seen from outside.
+        if m.matrix3.determinant() < 0.0 {
+            Arc::make_mut(&mut mesh.triangles).par_iter_mut().for_each(|t| t.swap(1, 2));
+        }
+    }
+    mesh
+}
+
+/// The common factor of a transform that only rotates, mirrors and scales evenly.
+fn uniform_scale(m: &DMat3) -> Option<f64> {
+    let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+    let scale = x.length();
+    let near = |value: f64, expected: f64| (value - expected).abs() <= 1e-12 * scale * scale;
+    let even = near(y.length_squared(), scale * scale) && near(z.length_squared(), scale * scale);
+    let square = near(x.dot(y), 0.0) && near(y.dot(z), 0.0) && near(z.dot(x), 0.0);
+    (even && square).then_some(scale)
+}
+
+fn check_transform(m: &DAffine3, object: &ObjectDesc) -> Result<(), SceneError> {
+    if !m.is_finite() {
+        return Err(SceneError::TransformNotFinite { at: object.at.clone() });
+    }
+    if is_singular(&m.matrix3) {
+        return Err(SceneError::TransformSingular { at: object.at.clone() });
+    }
+    Ok(())
+}
+
+fn check_row(m: &DAffine3, row: usize, object: &ObjectDesc) -> Result<(), SceneError> {
+    if m.is_finite() && !is_singular(&m.matrix3) {
+        return Ok(());
+    }
+    Err(SceneError::CopySingular { at: object.at.clone(), row })
+}
+
+/// Whether a matrix flattens space, to within f32.
+fn is_singular(m: &DMat3) -> bool {
+    let volume = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
+    // Also refuses NaN.
+    !(m.determinant().abs() > 1e-9 * volume)
+}
+
+/// What to subtract from coordinates within `bounds`: zero unless they are far from the origin
+/// compared with their extent, else about the centre, rounded so coarsely that subtracting it from
+/// an f32 is exact.
+fn far_center(bounds: &Bounds) -> DVec3 {
+    if bounds.is_empty() {
+        return DVec3::ZERO;
+    }
+    let extent = bounds.size().max_element();
+    let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
+    if reach <= 16.0 * extent {
+        return DVec3::ZERO;
+    }
+    let unit = extent.max(reach * f64::from(f32::EPSILON)).log2().ceil().exp2();
+    (bounds.center() / unit).round() * unit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_things_stay_where_they_are() {
+        let near = Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(15.0) };
+        assert_eq!(far_center(&near), DVec3::ZERO);
+        let far = near.translated(DVec3::new(1e7, 0.0, -3e6));
+        let center = far_center(&far);
+        assert!((far.center() - center).abs().max_element() <= 8.0);
+        // Subtraction is exact for any f32 in the box.
+        for x in [1e7f32 - 1.0, 1e7 + 3.0, 1e7 + 15.0] {
+            let moved = f64::from(x) - center.x;
+            assert_eq!(f64::from(moved as f32), moved);
+        }
+    }
+
+    #[test]
+    fn even_scales_are_recognised() {
+        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 1.0);
+        assert!((uniform_scale(&(turn * 3.0)).unwrap() - 3.0).abs() < 1e-12);
+        let mirrored = turn * DMat3::from_diagonal(DVec3::new(-2.0, 2.0, 2.0));
+        assert!((uniform_scale(&mirrored).unwrap() - 2.0).abs() < 1e-12);
+        assert_eq!(uniform_scale(&DMat3::from_diagonal(DVec3::new(1.0, 1.0, 1.1))), None);
+    }
+
+    #[test]
+    fn flat_matrices_are_singular_at_any_scale() {
+        assert!(is_singular(&DMat3::from_diagonal(DVec3::new(1.0, 0.0, 1.0))));
+        assert!(is_singular(&DMat3::from_cols(DVec3::X, DVec3::X, DVec3::Z)));
+        assert!(is_singular(&DMat3::ZERO));
+        assert!(!is_singular(&DMat3::from_diagonal(DVec3::splat(1e-12))));
+    }
+}

@@ -1,0 +1,175 @@
+//! From a hit to the point of the surface that it means: position with its error, normals, sides.
+
+use glam::{DAffine3, Vec3};
+
+use super::build::Scene;
+use crate::accel::{Geometry, Hit, Transform3x4, affine_from_rows};
+use crate::geometry::{Sphere, TriangleMesh};
+use crate::material::Material;
+use crate::math::{Ray, gamma, offset_ray_origin};
+use crate::scene::desc::Epsilon;
+
+/// A point on a surface, seen along a ray.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfacePoint<'a> {
+    /// Position in the scene's space.
+    pub position: Vec3,
+    /// Every coordinate of the position is off by at most this, and what a ray query computes for the
+    /// same surface is no further off.
+    pub error: f32,
+    /// Unit geometric normal on the viewer's side.
+    pub geometric_normal: Vec3,
+    /// Unit shading normal on the viewer's side.
+    pub normal: Vec3,
+    /// Whether the viewer is on the outside.
+    pub is_front: bool,
+    /// What the surface is made of.
+    pub material: &'a Material,
+}
+
+/// Position, error, outward geometric and shading normal (not of unit length) in one space.
+struct Local {
+    position: Vec3,
+    error: f32,
+    geometric_normal: Vec3,
+    normal: Vec3,
+}
+
+impl Scene {
+    /// The point that `ray` hit. It is found on the surface itself, not along the ray.
+    #[inline]
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint<'_> {
+        let geometry = &self.world.group(hit.copy).geometries[hit.geometry as usize];
+        let transform = hit.copy.map(|copy| self.world.transform(copy));
+        let local = match geometry {
+            Geometry::Mesh(mesh) => on_triangle(mesh, hit),
+            Geometry::Spheres(spheres) => {
+                on_sphere(&spheres[hit.primitive as usize], ray, hit.t, transform)
+            }
+        };
+        let placed = match transform {
+            None => local,
+            Some(rows) => to_world(&local, rows),
+        };
+        // A triangle of no area has no normal: any will do, as long as it faces the viewer.
+        let outward = placed.geometric_normal.try_normalize().unwrap_or(-ray.direction);
+        let is_front = outward.dot(ray.direction) <= 0.0;
+        let side = if is_front { 1.0 } else { -1.0 };
+        let normal = placed.normal.try_normalize().unwrap_or(outward);
+        // An interpolated normal may point to the other side of its triangle; the geometric one decides.
+        let normal = if normal.dot(outward) < 0.0 { -normal } else { normal };
+        SurfacePoint {
+            position: placed.position,
+            error: placed.error,
+            geometric_normal: outward * side,
+            normal: normal * side,
+            is_front,
+            material: self.material(hit),
+        }
+    }
+
+    /// The ray that leaves `point` into `direction` (unit length), as far as `distance`.
+    #[inline]
+    pub fn spawn(&self, point: &SurfacePoint<'_>, direction: Vec3, distance: f32) -> Ray {
+        // Short of the target by a few times the error of a hit's distance, so that a light on a
+        // surface is not hidden by it.
+        let t_max = distance * (1.0 - 16.0 * f32::EPSILON);
+        let (origin, t_min) = match self.settings.epsilon {
+            Epsilon::Auto => (
+                offset_ray_origin(point.position, point.error, point.geometric_normal, direction),
+                0.0,
+            ),
+            Epsilon::Fixed(epsilon) => (point.position, epsilon),
+        };
+        Ray { origin, direction, t_min, t_max }
+    }
+}
+
+/// The point with barycentric weights (1 − u − v, u, v).
+///
+/// The bound on its position is γ(7)·Σ|bᵢ pᵢ| (pbrt 4ed §6.8.4). Added is what a query may see: it
+/// subtracts the ray's origin from each corner, so its plane is off by a few roundings of the distance
+/// to the farthest corner.
+#[inline]
+fn on_triangle(mesh: &TriangleMesh, hit: &Hit) -> Local {
+    let [a, b, c] = mesh.corners(hit.primitive as usize);
+    let (u, v) = (hit.u, hit.v);
+    let w = 1.0 - u - v;
+    let (pa, pb, pc) = (a * w, b * u, c * v);
+    let position = pa + pb + pc;
+    let sum = (pa.abs() + pb.abs() + pc.abs()).max_element();
+    let reach = (a - position).abs().max((b - position).abs()).max((c - position).abs());
+    let geometric_normal = (b - a).cross(c - a);
+    let normal = match &mesh.normals {
+        None => geometric_normal,
+        Some(normals) => {
+            let [i, j, k] = mesh.triangles[hit.primitive as usize].map(|i| normals[i as usize]);
+            Vec3::from(i) * w + Vec3::from(j) * u + Vec3::from(k) * v
+        }
+    };
+    Local {
+        position,
+        error: gamma(7) * sum + gamma(8) * reach.max_element(),
+        geometric_normal,
+        normal,
+    }
+}
+
+/// The point of the sphere nearest to where the ray says it hit, in f64, rounded once.
+#[inline]
+fn on_sphere(sphere: &Sphere, ray: &Ray, t: f32, transform: Option<&Transform3x4>) -> Local {
+    let (mut o, mut d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    if let Some(rows) = transform {
+        let object_from_world = affine_from_rows(rows).inverse();
+        o = object_from_world.transform_point3(o);
+        d = object_from_world.transform_vector3(d);
+    }
+    let normal = sphere.normal_at(o + d * f64::from(t));
+    let position = (sphere.center + normal * sphere.radius).as_vec3();
+    let n = normal.as_vec3();
+    Local {
+        position,
+        error: gamma(2) * position.abs().max_element(),
+        geometric_normal: n,
+        normal: n,
+    }
+}
+
+/// From a copy's space to the world's.
+///
+/// The bound follows pbrt 4ed §6.8.5. Added is what a query may see: it takes the ray to the copy's
+/// space by an inverse that is itself rounded, an error in proportion to the translation.
+fn to_world(local: &Local, rows: &Transform3x4) -> Local {
+    let row =
+        |i: usize| (Vec3::new(rows[4 * i], rows[4 * i + 1], rows[4 * i + 2]), rows[4 * i + 3]);
+    let m = [row(0), row(1), row(2)];
+    let p = local.position;
+    let position = Vec3::from(m.map(|(r, t)| r.dot(p) + t));
+    let magnitude = Vec3::from(m.map(|(r, t)| r.abs().dot(p.abs()) + t.abs()));
+    let stretch = Vec3::from(m.map(|(r, _)| r.abs().element_sum()));
+    let error = stretch * local.error * (1.0 + gamma(3)) + magnitude * gamma(16);
+    let normal_matrix = NormalMatrix::new(&affine_from_rows(rows));
+    Local {
+        position,
+        error: error.max_element(),
+        geometric_normal: normal_matrix.apply(local.geometric_normal),
+        normal: normal_matrix.apply(local.normal),
+    }
+}
+
+/// The inverse transpose, up to a positive factor: the matrix of cofactors, with its sign turned where
+/// the transform mirrors, so that outward stays outward.
+struct NormalMatrix(glam::DMat3);
+
+impl NormalMatrix {
+    fn new(m: &DAffine3) -> Self {
+        let (x, y, z) = (m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis);
+        let cofactors = glam::DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+        let sign = x.dot(y.cross(z)).signum();
+        Self(cofactors * sign)
+    }
+
+    fn apply(&self, n: Vec3) -> Vec3 {
+        (self.0 * n.as_dvec3()).normalize_or_zero().as_vec3()
+    }
+}
