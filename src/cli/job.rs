@@ -107,7 +107,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         }
     }
     if rendered.interrupted {
-        eprintln!("alhazen: interrupted; the picture holds the tiles that were finished");
+        eprintln!("alhazen: interrupted; the picture holds what was finished, the rest is black");
         return Ok(Outcome::Interrupted);
     }
     Ok(Outcome::Done)
@@ -144,7 +144,11 @@ pub(super) fn build(args: &SceneArgs, loaded: LoadedScene) -> Result<Scene, Fail
         return Err(Failure::Interrupted);
     }
     let progress = Progress::new(args.quiet, "build");
-    let scene = Scene::build(loaded.scene, &options, &|done| progress.report(done, 0));
+    let go_on = |done| {
+        progress.report(done, 0);
+        !interrupted()
+    };
+    let scene = Scene::build(loaded.scene, &options, &go_on);
     progress.finish();
     scene.map_err(|errors| match errors.as_slice() {
         [SceneError::Accel(AccelError::Interrupted)] => Failure::Interrupted,

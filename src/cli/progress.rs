@@ -67,8 +67,8 @@ impl Progress {
         Self { display, phase, start: Instant::now() }
     }
 
-    /// A share of the phase is done. Returns whether to go on.
-    pub(super) fn report(&self, done: f64, rays: u64) -> bool {
+    /// A share of the phase is done.
+    pub(super) fn report(&self, done: f64, rays: u64) {
         let seconds = self.start.elapsed().as_secs_f64();
         let rate = || {
             if rays == 0 {
@@ -92,7 +92,6 @@ impl Progress {
                 }
             }
         }
-        !interrupted()
     }
 
     pub(super) fn finish(&self) {
@@ -103,7 +102,11 @@ impl Progress {
 }
 
 impl Observer for Progress {
-    fn progress(&self, done: f64, rays: u64) -> bool {
-        self.report(done, rays)
+    fn progress(&self, done: f64, rays: u64) {
+        self.report(done, rays);
+    }
+
+    fn stop(&self) -> bool {
+        interrupted()
     }
 }

@@ -1,5 +1,8 @@
 //! OpenEXR: linear light, half or float, with all that a reader should know in the header.
 
+use std::fs::File;
+use std::io::{self, Write};
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 use exr::meta::attribute::{AttributeValue as ExrValue, Chromaticities, IntegerBounds, Text};
@@ -156,12 +159,52 @@ pub fn write_exr(
     image.attributes.chromaticities = Some(REC_709);
 
     write_whole(path, |writer| {
-        image.write().to_buffered(writer).map_err(|error| match error {
+        image.write().to_buffered(&mut *writer).map_err(|error| match error {
             exr::error::Error::Io(e) => WriteError::io(path, "write", e),
             other => WriteError::format(path, other.to_string()),
-        })
+        })?;
+        writer.flush().map_err(|e| WriteError::io(path, "write", e))?;
+        sort_header(writer.get_ref()).map_err(|e| WriteError::io(path, "write", e))
     })?;
     Ok(pixel_type)
+}
+
+/// Puts the attributes of a single-part file's header into alphabetical order: the encoder takes our
+/// own from a hash map, in another order every time, and the same picture must be the same bytes.
+///
+/// A header is a list of (name, NUL, type, NUL, size as i32, value) that ends with a NUL; its length
+/// does not change. Source: *OpenEXR File Layout*, openexr.com.
+fn sort_header(file: &File) -> io::Result<()> {
+    const START: usize = 8;
+    let mut bytes = vec![0; 1 << 16];
+    let mut length = 0;
+    while length < bytes.len() {
+        match file.read_at(&mut bytes[length..], length as u64)? {
+            0 => break,
+            n => length += n,
+        }
+    }
+    let corrupt = || io::Error::other("the encoder wrote a header that cannot be read");
+    let text_end = |from: usize| {
+        let length = bytes[from..length].iter().position(|&b| b == 0)?;
+        Some(from + length)
+    };
+    let mut attributes = Vec::new();
+    let mut at = START;
+    loop {
+        let name_end = text_end(at).ok_or_else(corrupt)?;
+        if name_end == at {
+            break;
+        }
+        let type_end = text_end(name_end + 1).ok_or_else(corrupt)?;
+        let size = bytes.get(type_end + 1..type_end + 5).ok_or_else(corrupt)?;
+        let size = i32::from_le_bytes(size.try_into().map_err(|_| corrupt())?);
+        let end = type_end + 5 + usize::try_from(size).map_err(|_| corrupt())?;
+        attributes.push(bytes.get(at..end).ok_or_else(corrupt)?);
+        at = end;
+    }
+    attributes.sort_unstable();
+    file.write_all_at(&attributes.concat(), START as u64)
 }
 
 /// The primaries and the white point (D65) of our colours. Source: ITU-R BT.709-6 §1.

@@ -166,26 +166,31 @@ impl<'d, 'r> Interpreter<'d, 'r> {
 
     fn object(&mut self, fields: Fields<'d, 'r>) -> Option<ObjectDesc> {
         let at = fields.location();
-        let (shape, mesh, instance) =
-            (fields.get("shape"), fields.get("mesh"), fields.get("instance"));
-        let desc = match (shape, mesh, instance) {
-            (Some(node), None, None) => self.shape(&fields, node),
-            (None, Some(node), None) => {
+        let kinds = ["shape", "mesh", "instance"].map(|kind| fields.has(kind).then_some(kind));
+        let kinds: Vec<&'static str> = kinds.into_iter().flatten().collect();
+        let &[kind] = kinds.as_slice() else {
+            let message = "an object has one of the fields `shape`, `mesh`, `instance`";
+            self.reader.mistake(fields.span(), message);
+            return None;
+        };
+        let node = fields.get(kind)?;
+        let desc = match kind {
+            "shape" => {
+                // Without its kind, nothing can be said of the other fields.
+                let kind = fields.choose(node, "shape", &ShapeKind::ALL)?;
+                self.shape(&fields, kind)
+            }
+            "mesh" => {
                 fields.is("a mesh object");
                 self.mesh_file(&fields, node).map(ShapeDesc::Mesh)
             }
-            (None, None, Some(node)) => {
+            _ => {
                 fields.is("an instance");
                 self.instance(&fields, node)
             }
-            _ => {
-                let message = "an object has one of the fields `shape`, `mesh`, `instance`";
-                self.reader.mistake(fields.span(), message);
-                return None;
-            }
         };
         let material = match fields.get("material") {
-            Some(node) if instance.is_some() => {
+            Some(node) if kind == "instance" => {
                 let message = "an instance takes its materials from its prototype";
                 self.reader.mistake(node.span, message);
                 None
@@ -201,18 +206,17 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         desc.map(|shape| ObjectDesc { at, shape, material, transform })
     }
 
-    fn shape(&mut self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<ShapeDesc> {
-        let kinds = [("sphere", 0), ("triangle", 1), ("mesh", 2)];
-        let kind = fields.choose(node, "shape", &kinds)?;
-        fields.is(&format!("a {}", kinds[kind].0));
+    fn shape(&mut self, fields: &Fields<'d, 'r>, kind: ShapeKind) -> Option<ShapeDesc> {
         match kind {
-            0 => {
+            ShapeKind::Sphere => {
+                fields.is("a sphere");
                 let center = fields.vector("center").unwrap_or(DVec3::ZERO);
                 let radius = fields.require("radius");
                 let radius = radius.and_then(|node| fields.positive(node, "radius"))?;
                 Some(ShapeDesc::Sphere { center, radius })
             }
-            1 => {
+            ShapeKind::Triangle => {
+                fields.is("a triangle");
                 let node = fields.require("points")?;
                 let xyz = self.points(node, "points")?;
                 if xyz.len() != 9 {
@@ -222,7 +226,8 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 self.scene.meshes.push(inline_mesh(&xyz, vec![[0, 1, 2]]));
                 Some(ShapeDesc::Mesh(self.scene.meshes.len() - 1))
             }
-            _ => {
+            ShapeKind::Mesh => {
+                fields.is("a mesh");
                 let positions = fields.require("positions");
                 let triangles = fields.require("triangles");
                 let xyz = self.points(positions?, "positions")?;
@@ -322,6 +327,19 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         };
         Some(ShapeDesc::Instances { prototype, transforms })
     }
+}
+
+/// The values of `shape`.
+#[derive(Clone, Copy)]
+enum ShapeKind {
+    Sphere,
+    Triangle,
+    Mesh,
+}
+
+impl ShapeKind {
+    const ALL: [(&'static str, Self); 3] =
+        [("sphere", Self::Sphere), ("triangle", Self::Triangle), ("mesh", Self::Mesh)];
 }
 
 /// A mesh from numbers in the scene file, which are f64.

@@ -29,13 +29,16 @@ pub struct RenderJob {
     pub seed: u64,
 }
 
-/// Hears how a render goes. Called from all threads.
+/// Hears how a render goes, and ends it. Called from all threads.
 pub trait Observer: Sync {
-    /// A share of the work is done, from 0 to 1. Ends the render after the running tiles by returning
-    /// false.
-    fn progress(&self, done: f64, rays: u64) -> bool {
+    /// A share of the work is done, from 0 to 1.
+    fn progress(&self, done: f64, rays: u64) {
         let _ = (done, rays);
-        true
+    }
+
+    /// Whether to end the render after the blocks that are being worked on.
+    fn stop(&self) -> bool {
+        false
     }
 }
 
@@ -45,7 +48,7 @@ impl Observer for () {}
 /// What came of a render.
 #[derive(Debug)]
 pub struct Rendered {
-    /// The picture. Tiles that were not reached are black.
+    /// The picture. Blocks that were not reached are black.
     pub film: Film,
     /// Samples a pixel.
     pub samples: u32,
@@ -104,9 +107,9 @@ fn run<Q: RayQuery, I: Integrator>(
         whole,
     };
 
-    let finished = tiles.par_iter().try_for_each_init(BlockAccumulator::default, |sums, tile| {
+    tiles.par_iter().for_each_init(BlockAccumulator::default, |sums, tile| {
         let mut output = TileOutput::default();
-        renderer.render(tile, &window, sums, &mut output);
+        let pixels = renderer.render(tile, &window, sums, &mut output, observer);
         {
             let mut film = film.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             output.blocks.iter().for_each(|block| film.put(block));
@@ -117,19 +120,18 @@ fn run<Q: RayQuery, I: Integrator>(
             totals.1.count += output.non_finite.count;
             totals.1.first.append(&mut output.non_finite.first);
         }
-        let area = tile.intersection(&window).area() as u64;
-        let pixels = pixels_done.fetch_add(area, Ordering::Relaxed) + area;
+        let pixels = pixels_done.fetch_add(pixels, Ordering::Relaxed) + pixels;
         let traced = output.rays.total();
         let rays = rays_done.fetch_add(traced, Ordering::Relaxed) + traced;
-        observer.progress(pixels as f64 / window.area() as f64, rays).then_some(())
+        observer.progress(pixels as f64 / window.area() as f64, rays);
     });
 
     let (rays, mut non_finite) = totals.into_inner().unwrap_or_default();
     // Threads finish in any order; what is told does not depend on it.
     non_finite.first.sort_unstable_by_key(|([x, y], sample)| (*y, *x, *sample));
     non_finite.first.truncate(NON_FINITE_TOLD);
-    // A stop that was asked for with the last tile cut nothing off.
-    let interrupted = finished.is_none() && pixels_done.into_inner() < window.area() as u64;
+    // A stop that was asked for with the last block cut nothing off.
+    let interrupted = pixels_done.into_inner() < window.area() as u64;
     let film = film.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     Rendered { film, samples, rays, non_finite, interrupted }
 }
@@ -168,22 +170,31 @@ struct TileOutput {
 
 impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
     /// Renders the blocks of a tile that touch the window; whole blocks, as a packet's hits at shared
-    /// edges may depend on its neighbours, and a crop must not.
+    /// edges may depend on its neighbours, and a crop must not. Returns the pixels of the window that
+    /// were finished: all of the tile's unless the observer ended it.
     fn render(
         &self,
         tile: &PixelRect,
         window: &PixelRect,
         sums: &mut BlockAccumulator,
         output: &mut TileOutput,
-    ) {
+        observer: &dyn Observer,
+    ) -> u64 {
+        let mut pixels = 0;
         for y in (tile.y0..tile.y1).step_by(4) {
             for x in (tile.x0..tile.x1).step_by(4) {
                 let block = PixelRect { x0: x, y0: y, x1: x + 4, y1: y + 4 }.intersection(window);
-                if block.width() > 0 && block.height() > 0 {
-                    self.render_block([x, y], sums, output);
+                if block.area() == 0 {
+                    continue;
                 }
+                if observer.stop() {
+                    return pixels;
+                }
+                self.render_block([x, y], sums, output);
+                pixels += block.area() as u64;
             }
         }
+        pixels
     }
 
     fn render_block(&self, origin: [u32; 2], sums: &mut BlockAccumulator, output: &mut TileOutput) {

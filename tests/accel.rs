@@ -1,0 +1,365 @@
+//! Ray queries against the f64 oracle: every ray of Embree's must hit what brute force hits, on random
+//! worlds of triangles, spheres and transformed copies, near and far, at both rungs of precision.
+#![cfg(feature = "embree")]
+#![allow(missing_docs, clippy::print_stderr, reason = "a test program")]
+
+use std::sync::Arc;
+
+use alhazen::accel::{
+    AccelKind, BruteForce, BuildOptions, EmbreeAccel, Geometry, Group, Hit, InstanceSet, LANES,
+    Precision, RayBlock, RayQuery, World, affine_from_rows, rows_from_affine,
+};
+use alhazen::geometry::{Sphere, TriangleMesh};
+use alhazen::math::Ray;
+use alhazen::scene::{Epsilon, ObjectDesc, Scene, SceneDesc, ShapeDesc};
+use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+
+mod common;
+use common::Random;
+
+fn embree(world: &World, precision: Precision) -> EmbreeAccel {
+    let options = BuildOptions { precision, ..BuildOptions::default() };
+    EmbreeAccel::build(world, &options, &|_| true).unwrap()
+}
+
+/// A closed ball of triangles with a bumpy surface.
+fn ball(rings: u32, center: DVec3, radius: f64, bumps: f64) -> TriangleMesh {
+    let sectors = 2 * rings;
+    let mut xyz = Vec::new();
+    for i in 0..=rings {
+        for j in 0..sectors {
+            let theta = std::f64::consts::PI * f64::from(i) / f64::from(rings);
+            let phi = std::f64::consts::TAU * f64::from(j) / f64::from(sectors);
+            let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            // One point at each pole.
+            let wave =
+                if i == 0 || i == rings { 0.0 } else { (5.0 * theta).sin() * (4.0 * phi).sin() };
+            let p = center + d * radius * (1.0 + bumps * wave);
+            xyz.extend(p.as_vec3().to_array());
+        }
+    }
+    let at = |i: u32, j: u32| match i {
+        0 => 0,
+        i if i == rings => rings * sectors,
+        i => i * sectors + j % sectors,
+    };
+    let quads = (0..rings).flat_map(|i| (0..sectors).map(move |j| (i, j)));
+    let triangles = quads.flat_map(|(i, j)| {
+        let (a, b, c, d) = (at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
+        [[a, b, c], [a, c, d]]
+    });
+    let triangles = triangles.filter(|[a, b, c]| a != b && b != c && a != c).collect();
+    TriangleMesh::new(xyz, triangles)
+}
+
+fn triangle_soup(random: &mut Random, n: usize) -> TriangleMesh {
+    let mut xyz = Vec::new();
+    for _ in 0..n {
+        let center = random.in_cube() * 3.0;
+        for _ in 0..3 {
+            xyz.extend((center + random.in_cube()).as_vec3().to_array());
+        }
+    }
+    TriangleMesh::new(xyz, (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
+}
+
+fn spheres(random: &mut Random, n: usize) -> Geometry {
+    let sphere = |random: &mut Random| Sphere {
+        center: random.in_cube() * 3.0,
+        radius: 10f64.powf(random.between(-3.0, 0.0)),
+    };
+    Geometry::Spheres(Arc::new((0..n).map(|_| sphere(random)).collect()))
+}
+
+/// Any affine transform: turned, sheared, unevenly scaled, one in two mirrored.
+fn affine(random: &mut Random) -> DAffine3 {
+    let turn =
+        DQuat::from_axis_angle(random.direction(), random.between(0.0, std::f64::consts::TAU));
+    let scale =
+        DVec3::new(random.between(0.3, 2.0), random.between(0.3, 2.0), random.between(0.3, 2.0));
+    let mirror = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+    let shear =
+        DMat3::from_cols(DVec3::X, DVec3::new(random.between(-0.5, 0.5), 1.0, 0.0), DVec3::Z);
+    let m =
+        DMat3::from_quat(turn) * shear * DMat3::from_diagonal(scale * DVec3::new(mirror, 1.0, 1.0));
+    DAffine3::from_mat3_translation(m, random.in_cube() * 6.0)
+}
+
+fn random_world(random: &mut Random) -> World {
+    let mut group = |n: usize| Group {
+        geometries: vec![
+            Geometry::Mesh(triangle_soup(random, n)),
+            spheres(random, n / 2 + 1),
+            Geometry::Mesh(ball(6, random.in_cube() * 2.0, random.between(0.2, 1.0), 0.2)),
+        ],
+    };
+    let root = group(12);
+    let prototypes = vec![group(6), group(3)];
+    let sets = (0..2).map(|prototype| {
+        let rows = (0..4).map(|_| rows_from_affine(&affine(random))).collect();
+        InstanceSet { prototype, transforms: Arc::new(rows) }
+    });
+    World { root, prototypes, sets: sets.collect() }
+}
+
+fn random_ray(random: &mut Random) -> Ray {
+    let origin = random.in_cube() * 9.0;
+    let target = random.in_cube() * 6.0;
+    let direction = (target - origin).normalize();
+    let mut ray = Ray::new(origin.as_vec3(), direction.as_vec3());
+    if random.unit() < 0.2 {
+        ray.t_max = random.between(0.5, 12.0) as f32;
+    }
+    ray
+}
+
+/// The world-space point of a hit and how far rounding may have moved it along the ray.
+fn tolerance(ray: &Ray, hit: &Hit) -> f32 {
+    let reach = ray.origin.length() + hit.t * ray.direction.length() + 12.0;
+    3e-6 * reach
+}
+
+/// Rays that graze an edge may fall either way. They are told by moving the ray sideways a little: if
+/// the oracle changes its mind, either answer is right.
+fn is_borderline(oracle: &BruteForce, ray: &Ray, expected: &Option<Hit>) -> bool {
+    let (a, b) = ray.direction.any_orthonormal_pair();
+    let nudge = 4e-5;
+    [a, -a, b, -b].into_iter().any(|side| {
+        let moved = Ray { origin: ray.origin + side * nudge, ..*ray };
+        match (oracle.intersect(&moved), expected) {
+            (Some(x), Some(y)) => (x.t - y.t).abs() > 0.02 || who(&x) != who(y),
+            (None, None) => false,
+            _ => true,
+        }
+    })
+}
+
+fn who(hit: &Hit) -> (Option<alhazen::accel::CopyRef>, u32, u32) {
+    (hit.copy, hit.geometry, hit.primitive)
+}
+
+fn check(oracle: &BruteForce, accel: &EmbreeAccel, rays: &[Ray], seed: u64) -> usize {
+    let mut borderline = 0;
+    for ray in rays {
+        let expected = oracle.intersect(ray);
+        let got = accel.intersect(ray);
+        assert_eq!(accel.occluded(ray), got.is_some(), "seed {seed}: {ray:?}");
+        assert_eq!(oracle.occluded(ray), expected.is_some(), "seed {seed}: {ray:?}");
+        let same = match (&expected, &got) {
+            (Some(e), Some(g)) => {
+                (e.t - g.t).abs() < tolerance(ray, e)
+                    && who(e) == who(g)
+                    && (e.u - g.u).abs() < 2e-3
+                    && (e.v - g.v).abs() < 2e-3
+            }
+            (None, None) => true,
+            _ => false,
+        };
+        if !same {
+            assert!(
+                is_borderline(oracle, ray, &expected),
+                "seed {seed}: {ray:?}\nexpected {expected:?}\n     got {got:?}"
+            );
+            borderline += 1;
+        }
+    }
+    borderline
+}
+
+#[test]
+fn embree_agrees_with_the_oracle() {
+    let worlds = if common::verify() { 400 } else { 40 };
+    for seed in 0..worlds {
+        let mut random = Random(seed);
+        let world = random_world(&mut random);
+        let oracle = BruteForce::new(&world);
+        let rays: Vec<Ray> = (0..500).map(|_| random_ray(&mut random)).collect();
+        for precision in Precision::ALL {
+            let borderline = check(&oracle, &embree(&world, precision), &rays, seed);
+            assert!(borderline <= 5, "seed {seed}: {borderline} of 500 rays were borderline");
+        }
+    }
+}
+
+/// A block traced in packets gives what its rays give one by one; where two primitives touch, either.
+#[test]
+fn blocks_agree_with_single_rays() {
+    let mut different = 0;
+    for seed in 100..120 {
+        let mut random = Random(seed);
+        let world = random_world(&mut random);
+        let accel = embree(&world, Precision::Robust);
+        for _ in 0..100 {
+            let ray = random_ray(&mut random);
+            let mut block = RayBlock::empty();
+            let active = random.bits() as u16;
+            for lane in (0..LANES).filter(|lane| active >> lane & 1 == 1) {
+                let d = ray.direction + (random.in_cube() * 0.02).as_vec3();
+                block.set(lane, &Ray { direction: d.normalize(), ..ray });
+            }
+            assert_eq!(block.active(), active);
+            let hits = accel.intersect_block(&block);
+            let occluded = accel.occluded_block(&block);
+            for lane in 0..LANES {
+                if active >> lane & 1 == 0 {
+                    assert!(hits.get(lane).is_none() && occluded >> lane & 1 == 0);
+                    continue;
+                }
+                let alone = accel.intersect(&block.get(lane));
+                let hit = hits.get(lane);
+                assert_eq!(hit.is_some(), alone.is_some(), "seed {seed}");
+                assert_eq!(occluded >> lane & 1 == 1, alone.is_some(), "seed {seed}");
+                if let (Some(a), Some(b)) = (alone, hit) {
+                    assert!((a.t - b.t).abs() <= tolerance(&ray, &a), "seed {seed}: {a:?} {b:?}");
+                    different += usize::from(who(&a) != who(b));
+                }
+            }
+        }
+    }
+    assert!(different <= 2, "{different} lanes named another primitive");
+}
+
+/// More copies than single instances are made for: an instance array, with the same hits.
+#[test]
+fn many_copies_become_an_array_with_the_same_hits() {
+    let mut random = Random(77);
+    let prototype = Group { geometries: vec![Geometry::Mesh(ball(4, DVec3::ZERO, 0.4, 0.1))] };
+    let n = 70_000u32;
+    let place = |i: u32| {
+        let at = DVec3::new(f64::from(i % 300), 0.0, f64::from(i / 300));
+        rows_from_affine(&DAffine3::from_translation(at))
+    };
+    let rows: Vec<_> = (0..n).map(place).collect();
+    let set = InstanceSet { prototype: 0, transforms: Arc::new(rows) };
+    let world = World { prototypes: vec![prototype], sets: vec![set], ..World::default() };
+    let accel = embree(&world, Precision::Robust);
+    for _ in 0..2000 {
+        let i = random.below(n as usize) as u32;
+        let (x, z) = (f64::from(i % 300), f64::from(i / 300));
+        let offset = random.in_cube() * 0.2;
+        let origin = DVec3::new(x + offset.x, 5.0, z + offset.z).as_vec3();
+        let hit = accel.intersect(&Ray::new(origin, Vec3::NEG_Y)).unwrap();
+        assert_eq!(hit.copy.unwrap().index, i);
+        assert!(hit.t > 4.5 && hit.t < 5.0);
+    }
+}
+
+/// `robust` loses no ray at an edge of a closed mesh, `fast` does: the ladder means something.
+#[test]
+fn robust_loses_no_ray_at_edges() {
+    let mesh = ball(40, DVec3::ZERO, 1.0, 0.1);
+    let edges: Vec<[Vec3; 2]> = (0..mesh.triangles.len())
+        .flat_map(|i| {
+            let [a, b, c] = mesh.corners(i);
+            [[a, b], [b, c], [c, a]]
+        })
+        .collect();
+    let group = Group { geometries: vec![Geometry::Mesh(mesh)] };
+    let world = World { root: group, ..World::default() };
+    let lost = |precision: Precision| {
+        let accel = embree(&world, precision);
+        let mut random = Random(1);
+        let n = if common::verify() { 1_000_000 } else { 100_000 };
+        (0..n)
+            .filter(|_| {
+                let [a, b] = edges[random.below(edges.len())];
+                let target = a.lerp(b, random.between(0.05, 0.95) as f32);
+                let origin = (random.in_cube() * 0.1).as_vec3();
+                let ray = Ray::new(origin, (target - origin).normalize());
+                accel.intersect(&ray).is_none()
+            })
+            .count()
+    };
+    let (robust, fast) = (lost(Precision::Robust), lost(Precision::Fast));
+    eprintln!("lost at edges: robust {robust}, fast {fast}");
+    assert_eq!(robust, 0);
+    assert!(fast > 0, "then `fast` costs nothing in accuracy, and `robust` can go");
+}
+
+/// A ray that leaves a convex surface outward hits nothing: every hit is a false one with itself.
+#[test]
+fn no_ray_hits_the_surface_that_it_leaves() {
+    let sphere = |center: DVec3, radius: f64| ShapeDesc::Sphere { center, radius };
+    let n = if common::verify() { 200_000 } else { 20_000 };
+    for (offset, scale) in [(0.0, 1.0), (0.0, 1e-4), (0.0, 1e5), (300.0, 1.0), (2e4, 10.0)] {
+        let center = DVec3::new(offset, -offset, 0.5 * offset);
+        // Something at the origin keeps the world from being recentred on the object.
+        let anchor = sphere(DVec3::ZERO, 1e-3 * scale);
+        let uneven = DAffine3::from_mat3_translation(
+            DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0))
+                * DMat3::from_diagonal(DVec3::new(1.0, 0.3, -2.0) * scale),
+            center,
+        );
+        for kind in ["sphere", "ellipsoid", "mesh", "mesh copy"] {
+            let mut desc = SceneDesc::default();
+            let mut object = match kind {
+                "sphere" => ObjectDesc::new(sphere(center, scale), None),
+                "ellipsoid" => ObjectDesc::new(sphere(DVec3::ZERO, 1.0), None),
+                _ => {
+                    desc.meshes.push(ball(24, DVec3::ZERO, 1.0, 0.0));
+                    ObjectDesc::new(ShapeDesc::Mesh(0), None)
+                }
+            };
+            if kind != "sphere" {
+                object.transform = uneven;
+            }
+            if kind == "mesh copy" {
+                desc.objects.push(object.clone());
+                // Far away and behind: makes the mesh a prototype.
+                object.transform.translation += DVec3::new(0.0, 0.0, 1e3 * scale + offset);
+            }
+            desc.objects.extend([object, ObjectDesc::new(anchor.clone(), None)]);
+            assert_eq!(desc.settings.epsilon, Epsilon::Auto);
+            let scene = Scene::build_quietly(desc, AccelKind::Embree).unwrap();
+            let alhazen::accel::Accel::Embree(accel) = &scene.accel else { unreachable!() };
+            let center = center - scene.center;
+
+            let mut random = Random(9);
+            let (mut hits, mut false_hits) = (0, 0);
+            while hits < n {
+                let origin = center + random.direction() * 8.0 * scale;
+                let target = center + random.in_cube() * 0.5 * scale;
+                let ray = Ray::new(origin.as_vec3(), (target - origin).normalize().as_vec3());
+                let Some(hit) = accel.intersect(&ray) else { continue };
+                hits += 1;
+                let point = scene.surface(&ray, &hit);
+                // Uniform over the hemisphere, one in four nearly grazing.
+                let n = point.geometric_normal.as_dvec3();
+                let mut d = random.direction();
+                if random.unit() < 0.25 {
+                    d -= n * d.dot(n) * random.between(0.999, 1.0);
+                }
+                let d = if d.dot(n) < 0.0 { -d } else { d }.normalize().as_vec3();
+                // Rounding may turn a tangent inward; integrators refuse it.
+                if d.dot(point.geometric_normal) <= 0.0 {
+                    continue;
+                }
+                // Convex only where facets are flat: leave those with an outward corner to others.
+                let new = scene.spawn(&point, d, f32::INFINITY);
+                if accel.occluded(&new)
+                    && (kind == "sphere" || kind == "ellipsoid" || is_own(accel, &new, &hit))
+                {
+                    false_hits += 1;
+                }
+            }
+            assert_eq!(false_hits, 0, "{kind} at {offset}, scale {scale}: of {hits} rays");
+        }
+    }
+}
+
+/// Whether the next thing that `ray` meets is the primitive that it left.
+fn is_own(accel: &EmbreeAccel, ray: &Ray, left: &Hit) -> bool {
+    accel.intersect(ray).is_some_and(|hit| who(&hit) == who(left))
+}
+
+/// A copy's transform is what the oracle thinks it is, mirrored or not.
+#[test]
+fn rows_and_matrices_are_the_same_thing() {
+    let mut random = Random(4);
+    for _ in 0..100 {
+        let m = affine(&mut random);
+        let back = affine_from_rows(&rows_from_affine(&m));
+        let p = random.in_cube();
+        assert!((m.transform_point3(p) - back.transform_point3(p)).length() < 1e-5);
+    }
+}

@@ -1,0 +1,359 @@
+//! The built program in a fresh folder: what it writes, says and returns.
+#![allow(missing_docs, reason = "a test program")]
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+mod common;
+use common::{alhazen, stderr, stdout};
+
+const SCENE: &str = r#"
+[image]
+size = [80, 60]
+background = [0.2, 0.3, 0.4]
+[render]
+samples = 4
+[camera]
+eye = [0, 1, 5]
+target = [0, 0, 0]
+[cameras.side]
+eye = [5, 1, 0]
+target = [0, 0, 0]
+[materials.red]
+type = "phong"
+diffuse = [0.8, 0.1, 0.1]
+specular = 0.4
+[[objects]]
+shape = "sphere"
+radius = 1.0
+material = "red"
+[[objects]]
+shape = "mesh"
+positions = [[-9, -1, -9], [9, -1, -9], [9, -1, 9], [-9, -1, 9]]
+triangles = [[0, 2, 1], [0, 3, 2]]
+[[lights]]
+type = "point"
+position = [3, 4, 3]
+intensity = 90
+"#;
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    folder
+}
+
+/// Runs and expects success.
+fn run(folder: &Path, arguments: &[&str]) -> String {
+    let output = alhazen(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+    stdout(&output)
+}
+
+/// The linear pixels and the offset of an EXR.
+fn read_exr(path: &Path) -> (Vec<[f32; 3]>, [usize; 2], [i32; 2]) {
+    use exr::prelude::*;
+    let image = read_first_rgba_layer_from_file(
+        path,
+        |size, _| (vec![[0.0f32; 3]; size.area()], size),
+        |(pixels, size), position, (r, g, b, _): (f32, f32, f32, f32)| {
+            pixels[position.y() * size.width() + position.x()] = [r, g, b];
+        },
+    )
+    .unwrap();
+    let layer = image.layer_data;
+    let (pixels, size) = layer.channel_data.pixels;
+    let position = layer.attributes.layer_position;
+    (pixels, [size.width(), size.height()], [position.x(), position.y()])
+}
+
+#[test]
+fn render_writes_every_output_and_a_table() {
+    let folder = folder();
+    let table =
+        run(folder.path(), &["render", "scene.toml", "-o", "a.exr", "-o", "b.png", "-o", "c.EXR"]);
+    for word in
+        ["80 x 60", "seconds", "camera", "shadow", "Mrays/s", "memory", "error", "a.exr", "b.png"]
+    {
+        assert!(table.contains(word), "{word} is not in:\n{table}");
+    }
+    let (a, size, _) = read_exr(&folder.path().join("a.exr"));
+    assert_eq!(size, [80, 60]);
+    assert_eq!(a[0][2], 0.39990234, "the background, as half");
+    assert!(a.iter().any(|p| p[0] > 2.0 * p[1]), "something red");
+    assert_eq!(a, read_exr(&folder.path().join("c.EXR")).0);
+    let png = std::fs::read(folder.path().join("b.png")).unwrap();
+    assert_eq!(&png[..4], b"\x89PNG");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
+    assert_eq!(left.len(), 4, "no temporary file is left");
+}
+
+#[test]
+fn without_an_output_the_scenes_name_is_used() {
+    let folder = folder();
+    run(folder.path(), &["render", "scene.toml", "--quiet", "--size", "8x8"]);
+    assert_eq!(read_exr(&folder.path().join("scene.exr")).1, [8, 8]);
+}
+
+#[test]
+fn quiet_prints_nothing() {
+    let folder = folder();
+    let output = alhazen(folder.path(), &["render", "scene.toml", "-o", "a.exr", "--quiet"]);
+    assert_eq!((stdout(&output), stderr(&output)), (String::new(), String::new()));
+}
+
+#[test]
+fn the_picture_does_not_depend_on_threads() {
+    let folder = folder();
+    for threads in ["1", "2", "7"] {
+        let name = format!("t{threads}.exr");
+        run(
+            folder.path(),
+            &["render", "scene.toml", "-o", &name, "--threads", threads, "--seed", "3"],
+        );
+    }
+    let file = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert!(file("t1.exr") == file("t2.exr"), "byte for byte");
+    assert!(file("t1.exr") == file("t7.exr"), "byte for byte");
+    run(folder.path(), &["render", "scene.toml", "-o", "other.exr", "--seed", "4"]);
+    let [a, b] = ["t1.exr", "other.exr"].map(|name| read_exr(&folder.path().join(name)).0);
+    assert_ne!(a, b, "another seed, another picture");
+}
+
+#[test]
+fn a_crop_is_that_part_of_the_whole() {
+    let folder = folder();
+    run(folder.path(), &["render", "scene.toml", "-o", "whole.exr"]);
+    run(folder.path(), &["render", "scene.toml", "-o", "crop.exr", "--crop", "13,6,62,43"]);
+    let (whole, ..) = read_exr(&folder.path().join("whole.exr"));
+    let (crop, size, position) = read_exr(&folder.path().join("crop.exr"));
+    assert_eq!((size, position), ([49, 37], [13, 6]));
+    for y in 0..37 {
+        for x in 0..49 {
+            assert_eq!(crop[y * 49 + x], whole[(y + 6) * 80 + x + 13], "{x},{y}");
+        }
+    }
+}
+
+#[test]
+fn stats_are_json_with_the_documented_fields() {
+    let folder = folder();
+    run(
+        folder.path(),
+        &["render", "scene.toml", "-o", "a.exr", "--stats", "s.json", "--samples", "2"],
+    );
+    let text = std::fs::read_to_string(folder.path().join("s.json")).unwrap();
+    let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for phase in ["read", "build", "render", "write", "total"] {
+        assert!(stats["seconds"][phase].as_f64().unwrap() >= 0.0, "{phase}");
+    }
+    assert_eq!(stats["rays"]["camera"], 80 * 60 * 2);
+    assert!(stats["rays"]["shadow"].as_u64().unwrap() > 1000);
+    for kind in ["reflection", "refraction", "diffuse"] {
+        assert_eq!(stats["rays"][kind], 0);
+    }
+    assert!(stats["memory"]["peak_bytes"].as_u64().unwrap() > 1 << 20);
+    assert!(stats["memory"]["accelerator_bytes"].is_u64());
+    assert_eq!((&stats["samples"], &stats["stop"]), (&2.into(), &"samples".into()));
+    assert!(stats["error"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn set_and_flags_change_the_scene() {
+    let folder = folder();
+    let render = |name: &str, more: &[&str]| {
+        let mut arguments = vec!["render", "scene.toml", "--size", "16x16", "-o", name];
+        arguments.extend(more);
+        run(folder.path(), &arguments);
+        read_exr(&folder.path().join(name)).0
+    };
+    let base = render("base.exr", &[]);
+    assert_ne!(base, render("side.exr", &["--camera", "side"]));
+    assert_ne!(base, render("blue.exr", &["--set", "materials.red.diffuse=[0, 0, 1]"]));
+    assert_ne!(base, render("small.exr", &["--set", "objects.0.radius=0.5"]));
+    let flat = render("flat.exr", &["--integrator", "flat", "--filter", "box"]);
+    let flat_too =
+        render("too.exr", &["--set", "render.integrator=flat", "--set", "render.filter=box"]);
+    assert_eq!(flat, flat_too);
+}
+
+#[test]
+fn the_brute_force_picture_is_embrees() {
+    let folder = folder();
+    run(folder.path(), &["render", "scene.toml", "-o", "brute.exr", "--accel", "brute"]);
+    run(folder.path(), &["render", "scene.toml", "-o", "default.exr"]);
+    let (a, ..) = read_exr(&folder.path().join("brute.exr"));
+    let (b, ..) = read_exr(&folder.path().join("default.exr"));
+    let different =
+        a.iter().zip(&b).filter(|(a, b)| (a[0] - b[0]).abs() > 2e-3 * a[0].max(0.1)).count();
+    assert!(different <= 3, "{different} of 4800 pixels");
+}
+
+#[test]
+fn exr_types_and_compressions_hold_the_same_picture() {
+    let folder = folder();
+    run(folder.path(), &["render", "scene.toml", "-o", "half.exr"]);
+    run(folder.path(), &["render", "scene.toml", "-o", "float.exr", "--exr-type", "float"]);
+    let (half, ..) = read_exr(&folder.path().join("half.exr"));
+    let (float, ..) = read_exr(&folder.path().join("float.exr"));
+    for (h, f) in half.iter().flatten().zip(float.iter().flatten()) {
+        assert!((h - f).abs() <= f.abs() * 1e-3);
+    }
+    for compression in ["none", "rle", "zips", "zip", "piz"] {
+        let name = format!("{compression}.exr");
+        run(
+            folder.path(),
+            &["render", "scene.toml", "-o", &name, "--exr-compression", compression],
+        );
+        assert_eq!(half, read_exr(&folder.path().join(&name)).0, "{compression} is lossless");
+    }
+}
+
+#[test]
+fn what_half_cannot_hold_is_written_as_float() {
+    let folder = folder();
+    let arguments = [
+        "render",
+        "scene.toml",
+        "-o",
+        "bright.exr",
+        "--set",
+        "lights.0.intensity=1e9",
+        "--size",
+        "20x20",
+    ];
+    let output = alhazen(folder.path(), &arguments);
+    assert!(output.status.success());
+    assert!(stderr(&output).contains("bright.exr: written as float, as half ends at 65504"));
+    assert!(read_exr(&folder.path().join("bright.exr")).0.iter().any(|p| p[0] > 65504.0));
+}
+
+#[test]
+fn bad_input_is_exit_code_2_and_nothing_is_written() {
+    let folder = folder();
+    std::fs::write(folder.path().join("bad.toml"), "[camera]\nfow = 3\n").unwrap();
+    std::fs::write(folder.path().join("old.exr"), "old").unwrap();
+    let cases: &[(&[&str], &str)] = &[
+        (&["render", "missing.toml"], "alhazen: missing.toml: cannot read: No such file"),
+        (
+            &["render", "bad.toml", "-o", "old.exr"],
+            "bad.toml:2:1: unknown field `fow` in [camera] (did you mean `fov`?)",
+        ),
+        (
+            &["render", "scene.toml", "-o", "x.jpg"],
+            "x.jpg: unknown kind of picture; accepted: .exr, .png",
+        ),
+        (
+            &["render", "scene.toml", "-o", "nowhere/x.exr"],
+            "nowhere/x.exr: cannot create a file in its folder",
+        ),
+        (
+            &["render", "scene.txt"],
+            "scene.txt: unknown kind of scene; accepted: .toml, .ply, .obj, .stl",
+        ),
+        (
+            &["render", "scene.toml", "--crop", "0,0,81,60"],
+            "--crop 0,0,81,60 reaches beyond the picture of 80x60",
+        ),
+        (&["render", "scene.toml", "--crop", "5,5,5,9"], "expected X0 < X1 and Y0 < Y1"),
+        (&["render", "scene.toml", "--size", "0x10"], "expected WIDTHxHEIGHT"),
+        (&["render", "scene.toml", "--samples", "0"], "0 is not in 1..=16777216"),
+        (&["render", "scene.toml", "--camera", "top"], "unknown camera `top`; accepted: side"),
+        (
+            &["render", "scene.toml", "--set", "camera.fov=200"],
+            "--set camera.fov=200: `fov` must be an angle between 0 and 180 degrees, not the number 200",
+        ),
+        (&["render", "scene.toml", "--accel", "octree"], "invalid value 'octree'"),
+        (&["render"], "required arguments"),
+        (&["paint"], "unrecognized subcommand"),
+        (&["inspect", "bad.toml"], "unknown field `fow`"),
+    ];
+    for (arguments, message) in cases {
+        let output = alhazen(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(message), "{arguments:?}: {}", stderr(&output));
+        assert!(stdout(&output).is_empty());
+    }
+    assert_eq!(std::fs::read(folder.path().join("old.exr")).unwrap(), b"old");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+}
+
+#[test]
+#[cfg(feature = "embree")]
+fn a_memory_limit_is_an_error_not_a_crash() {
+    let folder = folder();
+    let mut obj = String::new();
+    for i in 0..200 {
+        for j in 0..200 {
+            obj += &format!("v {i} {} {j}\n", (i * j) % 7);
+        }
+    }
+    for i in 0..199 {
+        for j in 0..199 {
+            let a = 200 * i + j + 1;
+            obj += &format!("f {a} {} {} {}\n", a + 1, a + 201, a + 200);
+        }
+    }
+    std::fs::write(folder.path().join("grid.obj"), obj).unwrap();
+    let output =
+        alhazen(folder.path(), &["render", "grid.obj", "-o", "x.exr", "--memory-limit", "1M"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(stderr(&output).contains("needs more than the memory limit of 1048576 bytes"));
+    assert!(!folder.path().join("x.exr").exists());
+    run(
+        folder.path(),
+        &["render", "grid.obj", "-o", "x.exr", "--memory-limit", "1G", "--size", "32x32"],
+    );
+}
+
+#[test]
+fn inspect_says_what_there_is() {
+    let folder = folder();
+    let text = run(folder.path(), &["inspect", "scene.toml"]);
+    for word in
+        ["2 triangles, 1 sphere", "1 point light", "shadow rays", "80 x 60", "read", "build"]
+    {
+        assert!(text.contains(word), "{word} is not in:\n{text}");
+    }
+}
+
+#[test]
+fn help_teaches() {
+    let folder = folder();
+    let text = run(folder.path(), &["--help"]);
+    for word in ["render", "inspect", "alhazen render bunny.ply", "Exit codes"] {
+        assert!(text.contains(word), "{word} is not in:\n{text}");
+    }
+    let text = run(folder.path(), &["render", "--help"]);
+    for flag in
+        ["--size", "--samples", "--crop", "--threads", "--seed", "--stats", "--precision", "--set"]
+    {
+        assert!(text.contains(flag), "{flag}");
+    }
+    assert!(run(folder.path(), &["--version"]).starts_with("alhazen 0."));
+}
+
+/// Ctrl-C in the middle: exit code 130, and a picture that opens.
+#[test]
+fn an_interrupt_leaves_a_valid_picture() {
+    let folder = folder();
+    let child = Command::new(env!("CARGO_BIN_EXE_alhazen"))
+        .current_dir(folder.path())
+        .args(["render", "scene.toml", "-o", "cut.exr", "--samples", "50000", "--stats", "s.json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    let start = Instant::now();
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let output = child.wait_with_output().unwrap();
+    assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+    assert!(stderr(&output).contains("interrupted"));
+    assert_eq!(read_exr(&folder.path().join("cut.exr")).1, [80, 60]);
+    let stats = std::fs::read_to_string(folder.path().join("s.json")).unwrap();
+    assert!(stats.contains("\"stop\": \"interrupted\""), "{stats}");
+}

@@ -1,0 +1,176 @@
+//! The exact text of what is wrong with a scene, as a person reads it.
+#![allow(missing_docs, reason = "a test program")]
+
+use alhazen::accel::AccelKind;
+use alhazen::io::{LoadOptions, load_scene};
+use alhazen::scene::Scene;
+
+/// All messages for a scene file of this text, a line each, with the folder's name taken off.
+fn mistakes(text: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("f.toml");
+    std::fs::write(&path, text).unwrap();
+    let message = match load_scene(&path, &LoadOptions::default()) {
+        Err(error) => error.to_string(),
+        Ok(loaded) => match Scene::build_quietly(loaded.scene, AccelKind::Brute) {
+            Ok(_) => "no mistake".to_owned(),
+            Err(errors) => errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"),
+        },
+    };
+    message.replace(&format!("{}/", folder.path().display()), "")
+}
+
+#[track_caller]
+fn check(text: &str, expected: &str) {
+    assert_eq!(mistakes(text), expected.trim_matches('\n'), "for:\n{text}");
+}
+
+#[test]
+fn all_mistakes_are_told_in_one_run() {
+    check(
+        r#"
+[image]
+size = [0, 10]
+[camera]
+eye = [0, 0]
+fov = 181
+[render]
+samples = -1
+filter = "boxx"
+epsilon = "small"
+[[objects]]
+shape = "sphere"
+raduis = 1.0
+[[objects]]
+shape = "spere"
+radius = 1.0
+[[lights]]
+type = "point"
+position = [0, 1, 0]
+"#,
+        r"
+f.toml:3:8: `size` must be [width, height] in pixels, whole numbers from 1 to 65535, not a list of 2
+f.toml:5:7: `eye` must be a list of 3 finite numbers, not a list of 2
+f.toml:6:7: `fov` must be an angle between 0 and 180 degrees, not the number 181
+f.toml:8:11: `samples` must be a whole number from 1 to 16777216, not the number -1
+f.toml:9:10: unknown filter `boxx` (did you mean `box`?); accepted: box, triangle, gaussian, mitchell, blackman-harris
+f.toml:10:11: `epsilon` must be &quot;auto&quot; or a distance from 0 on, not the text &quot;small&quot;
+f.toml:11:1: a sphere lacks the field `radius`
+f.toml:13:1: unknown field `raduis` in a sphere (did you mean `radius`?); accepted: shape, center, radius, material, transform
+f.toml:15:9: unknown shape `spere` (did you mean `sphere`?); accepted: sphere, triangle, mesh
+f.toml:17:1: [[lights]] lacks the field `intensity`
+"
+        .replace("&quot;", "\"")
+        .as_str(),
+    );
+}
+
+#[test]
+fn syntax_is_told_with_its_place() {
+    check("[camera\nfov = 3\n", "f.toml:1:8: unclosed table, expected `]`");
+    assert!(mistakes("a = 1\na = 2\n").starts_with("f.toml:2:1: duplicate key"));
+}
+
+#[test]
+fn unknown_tables_and_names() {
+    check(
+        "[imege]\nsize = [1, 1]\n[[objects]]\nshape = 3\n",
+        "
+f.toml:1:2: unknown field `imege` in the scene (did you mean `image`?); accepted: image, render, ambient, camera, cameras, materials, lights, prototypes, objects
+f.toml:4:9: `shape` must be text, not the number 3",
+    );
+    check(
+        "[materials.gold]\ntype = \"diffuse\"\n[materials.grey]\ntype = \"diffuse\"\n[[objects]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"golt\"\n[[objects]]\ninstance = \"tree\"\n",
+        "
+f.toml:8:12: unknown material `golt` (did you mean `gold`?); accepted: gold, grey
+f.toml:10:12: unknown prototype `tree`; accepted: none is defined",
+    );
+}
+
+#[test]
+fn objects_are_one_thing() {
+    check(
+        "[[objects]]\nshape = \"sphere\"\nmesh = \"a.ply\"\n[[objects]]\nmaterial = \"x\"\n",
+        "
+f.toml:1:1: an object has one of the fields `shape`, `mesh`, `instance`
+f.toml:4:1: an object has one of the fields `shape`, `mesh`, `instance`",
+    );
+}
+
+#[test]
+fn numbers_are_checked() {
+    check(
+        "[[objects]]\nshape = \"sphere\"\nradius = 0\n[[objects]]\nshape = \"sphere\"\nradius = nan\n[materials.m]\ntype = \"diffuse\"\nreflectance = 1.5\n[ambient]\nradiance = -1\n",
+        "
+f.toml:3:10: `radius` must be above 0, not 0
+f.toml:6:10: `radius` must be a finite number, not the number NaN
+f.toml:9:15: `reflectance` must lie in [0, 1]: a surface cannot reflect more light than it gets
+f.toml:11:12: `radiance` must not be negative or beyond f32",
+    );
+}
+
+#[test]
+fn transforms_are_checked() {
+    check(
+        "[[objects]]\nshape = \"sphere\"\nradius = 1\ntransform = [{ rotate = { axis = [0, 0, 0], degrees = 3 } }]\n[[objects]]\nshape = \"sphere\"\nradius = 1\ntransform = [{ shear = 2 }]\n[[objects]]\nshape = \"sphere\"\nradius = 1\ntransform = 3\n",
+        "
+f.toml:4:34: the `axis` of a rotation must not be zero
+f.toml:8:16: unknown field `shear` in a step of a transform; accepted: scale, rotate, translate, matrix
+f.toml:12:13: `transform` must be a list of steps: { scale = … }, { rotate = … }, { translate = … }, { matrix = … }, not the number 3",
+    );
+    check(
+        "[[objects]]\nshape = \"sphere\"\nradius = 1\ntransform = [{ scale = [1, 0, 1] }]\n",
+        "f.toml:1:1: the transform of this object is singular: it flattens the object to a plane, a line or a point",
+    );
+}
+
+#[test]
+fn copies_are_checked() {
+    check(
+        "[prototypes.a]\nobjects = [{ shape = \"sphere\", radius = 1 }]\n[[objects]]\ninstance = \"a\"\ntransforms = [[1,0,0,0, 0,1,0,0, 0,0,1,0], [1,0,0,0, 0,0,0,0, 0,0,1,0]]\n",
+        "f.toml:3:1: transform 1 (counted from 0) of this object is singular or not finite",
+    );
+    check(
+        "[prototypes.a]\nobjects = [{ instance = \"b\" }]\n[prototypes.b]\nobjects = [{ instance = \"a\" }]\n[[objects]]\ninstance = \"a\"\n",
+        "f.toml:4:25: prototype `a` contains itself",
+    );
+}
+
+#[test]
+fn cameras_need_a_direction() {
+    check(
+        "[camera]\neye = [1, 2, 3]\ntarget = [1, 2, 3]\n",
+        "f.toml:1:1: the camera has no direction: `eye` and `target` must differ, and `up` must not be parallel to the view; a `transform` must not be singular",
+    );
+    check(
+        "[camera]\nprojection = \"orthographic\"\neye = [1, 2, 3]\n",
+        "f.toml:1:1: an orthographic camera with an `eye` needs a `height`",
+    );
+}
+
+#[test]
+fn inline_meshes_are_checked() {
+    check(
+        "[[objects]]\nshape = \"mesh\"\npositions = [[0,0,0], [1,0,0], [0,1,0]]\ntriangles = [[0, 1, 3]]\n[[objects]]\nshape = \"triangle\"\npoints = [[0,0,0], [1,0,0]]\n",
+        "
+f.toml:4:14: triangle 0 names vertex 3, but there are 3 (the first is 0)
+f.toml:7:10: `points` must be three points, not a list of 2",
+    );
+}
+
+#[test]
+fn files_that_a_scene_names_are_told_with_their_own_place() {
+    let text = mistakes("[[objects]]\nmesh = \"none.ply\"\n[[objects]]\nmesh = \"tree.fbx\"\n");
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), 2, "{text}");
+    assert!(lines[0].starts_with("f.toml:2:8: none.ply: cannot open: "), "{text}");
+    assert!(
+        lines[1].starts_with("f.toml:4:8: tree.fbx: unknown mesh file extension `.fbx`"),
+        "{text}"
+    );
+}
+
+#[test]
+fn an_empty_scene_is_no_mistake() {
+    check("", "no mistake");
+}
