@@ -22,7 +22,7 @@ demo: build ## Renders scenes/showcase.toml to out/showcase.exr and out/showcase
 test: ## Runs every test, with and without Embree
 	@$(SETUP) test
 	$(CARGO) test --locked
-	$(CARGO) test --locked --no-default-features --target-dir target/no-embree
+	$(CARGO) test --locked --no-default-features
 
 verify: test ## Runs what takes longer: many more random rays and scenes
 	ALHAZEN_VERIFY=1 $(CARGO) test --locked --release
@@ -33,7 +33,7 @@ bench: setup ## Measures ray queries against bare Embree
 lint: setup ## Formatting, clippy and documentation without warnings
 	$(CARGO) fmt --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
-	$(CARGO) clippy --locked --all-targets --no-default-features --target-dir target/no-embree -- -D warnings
+	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
 
 doc: setup ## Builds the library's documentation: target/doc/alhazen

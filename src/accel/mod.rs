@@ -217,6 +217,7 @@ impl Accel {
         match options.kind {
             #[cfg(feature = "embree")]
             AccelKind::Embree => EmbreeAccel::build(world, options, progress).map(Self::Embree),
+            AccelKind::Brute if !progress(0.0) => Err(AccelError::Interrupted),
             AccelKind::Brute => Ok(Self::Brute(BruteForce::new(world))),
         }
     }

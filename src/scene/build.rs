@@ -218,8 +218,8 @@ impl Scene {
         // A scene without light of its own is lit from the camera's side.
         let unlit = desc.lights.is_empty() && desc.ambient.is_none();
         let lights = if unlit { default_lights(&pose) } else { lights(&desc.lights, center) };
-        let ambient = desc.ambient.unwrap_or(Rgb::splat(if unlit { 0.12 } else { 0.0 }));
-        let default_background = if unlit { Rgb::splat(0.18) } else { Rgb::BLACK };
+        let ambient = desc.ambient.unwrap_or(Rgb::splat(if unlit { 0.15 } else { 0.0 }));
+        let default_background = if unlit { Rgb::splat(0.06) } else { Rgb::BLACK };
 
         let mut materials = vec![Material::Diffuse { reflectance: Rgb::splat(0.6) }];
         materials.extend(desc.materials.into_iter().map(|m| m.material));
@@ -308,5 +308,5 @@ fn default_lights(pose: &Pose) -> Vec<Light> {
             irradiance: Rgb::splat(irradiance),
         })
     };
-    vec![towards(0.55, -0.75, 1.0, 2.6), towards(-0.9, -0.25, 0.6, 0.7)]
+    vec![towards(0.55, -0.75, 1.0, 2.6), towards(-0.9, -0.25, 0.6, 1.0)]
 }
