@@ -17,7 +17,7 @@ build: setup ## Builds the release binary: target/release/alhazen
 
 demo: build ## Renders scenes/showcase.toml to out/showcase.exr and out/showcase.png
 	@mkdir -p out
-	target/release/alhazen render scenes/showcase.toml -o out/showcase.exr -o out/showcase.png
+	$(CARGO) run --release --locked --quiet -- render scenes/showcase.toml -o out/showcase.exr -o out/showcase.png
 
 test: ## Runs every test, with and without Embree
 	@$(SETUP) test

@@ -27,7 +27,11 @@ mod embree {
         println!("cargo::rerun-if-env-changed=EMBREE_DIR");
         let manifest = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("set by cargo"));
         let prefix = manifest.join(".embree");
-        println!("cargo::rerun-if-changed={}", prefix.join("usr/include/embree4").display());
+        // Only what exists: cargo takes a missing path for changed, at every build.
+        let headers = prefix.join("usr/include/embree4");
+        if headers.exists() {
+            println!("cargo::rerun-if-changed={}", headers.display());
+        }
 
         let Some(install) = find(&prefix) else {
             fail(

@@ -50,7 +50,9 @@ fn measure<Q: RayQuery>(scene: &Scene, query: &Q) {
         std::hint::black_box(render(scene, &RenderJob::default(), &()));
     };
     let packets = || {
-        camera.par_iter().for_each(|b| drop(std::hint::black_box(query.intersect_block(b))));
+        camera.par_iter().for_each(|b| {
+            std::hint::black_box(query.intersect_block(b));
+        });
         shadow.par_iter().for_each(|b| {
             std::hint::black_box(query.occluded_block(b));
         });
@@ -105,12 +107,12 @@ fn terrain(cells: u32) -> Scene {
     };
     let n = cells + 1;
     let at = |i: u32| 2.0 * f64::from(i) / f64::from(cells) - 1.0;
-    let xyz = (0..n).flat_map(|j| (0..n).map(move |i| (at(i), at(j)))).flat_map(|(x, z)| {
-        [x as f32, height(x, z) as f32, z as f32]
-    });
-    let triangles = (0..cells).flat_map(|j| (0..cells).map(move |i| j * n + i)).flat_map(|a| {
-        [[a, a + n, a + n + 1], [a, a + n + 1, a + 1]]
-    });
+    let xyz = (0..n)
+        .flat_map(|j| (0..n).map(move |i| (at(i), at(j))))
+        .flat_map(|(x, z)| [x as f32, height(x, z) as f32, z as f32]);
+    let triangles = (0..cells)
+        .flat_map(|j| (0..cells).map(move |i| j * n + i))
+        .flat_map(|a| [[a, a + n, a + n + 1], [a, a + n + 1, a + 1]]);
     let mesh = TriangleMesh::new(xyz.collect(), triangles.collect());
     let mut desc = SceneDesc { meshes: vec![mesh], ..SceneDesc::default() };
     desc.image.size = SIZE;
@@ -134,7 +136,8 @@ fn terrain(cells: u32) -> Scene {
 /// The camera rays that `render` traces for seed 0, block by block.
 fn camera_blocks(scene: &Scene) -> Vec<RayBlock> {
     let filter = FilterTable::new(scene.settings.filter);
-    let origins = (0..SIZE[1]).step_by(4).flat_map(|y| (0..SIZE[0]).step_by(4).map(move |x| [x, y]));
+    let origins =
+        (0..SIZE[1]).step_by(4).flat_map(|y| (0..SIZE[0]).step_by(4).map(move |x| [x, y]));
     let block = |[x0, y0]: [u32; 2]| {
         let mut block = RayBlock::empty();
         for lane in 0..LANES {

@@ -9,6 +9,7 @@
 # Where the distribution's Embree is older than 4 (Debian 12), Debian 13's is unpacked into the
 # prefix, together with the C library that it was built against; nothing else on the system changes.
 set -eu
+export LC_ALL=C # what apt prints is read below
 
 stage=${1:-build}
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)

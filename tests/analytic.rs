@@ -322,8 +322,11 @@ fn the_stated_error_is_the_true_one() {
         let values: Vec<f64> = films.iter().map(|f| f64::from(f.mean[i].g)).collect();
         let mean = values.iter().sum::<f64>() / n;
         shown += values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        stated +=
-            films.iter().map(|f| f64::from(f.variance.as_ref().unwrap()[i].g)).sum::<f64>() / n;
+        stated += films
+            .iter()
+            .map(|f| f64::from(f.standard_error.as_ref().unwrap()[i].g).powi(2))
+            .sum::<f64>()
+            / n;
     }
     let ratio = stated / shown;
     assert!((0.8..1.25).contains(&ratio), "stated {stated}, shown {shown}: {ratio}");

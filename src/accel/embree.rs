@@ -2,6 +2,9 @@
 //! Embree's ids become ours.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use glam::DVec3;
 
@@ -9,8 +12,9 @@ use super::block::{HitBlock, LANES, RayBlock, lanes_of};
 use super::world::{CopyRef, Geometry, Group, InstanceSet, World};
 use super::{AccelError, AccelInfo, BuildOptions, BuildQuality, Hit, Precision, RayQuery};
 use crate::embree::{
-    self, Device, DeviceConfig, EmbreeError, ErrorCode, INVALID_ID, PacketMask, Quality,
-    RayHitPacket, RayPacket, Scene, SceneBuilder, SceneFlags, UserBounds, UserGeometry, UserHit,
+    self, BuildProgress, Device, DeviceConfig, EmbreeError, ErrorCode, INVALID_ID, PacketMask,
+    Quality, RayHitPacket, RayPacket, Scene, SceneBuilder, SceneFlags, UserBounds, UserGeometry,
+    UserHit,
 };
 use crate::geometry::Sphere;
 use crate::math::Ray;
@@ -87,7 +91,7 @@ impl EmbreeAccel {
         let mut done = 0.0;
         let mut commit = |builder: SceneBuilder, size: usize| {
             let share = size as f64 / total;
-            let scene = builder.commit_with(&|x: f64| progress(done + share * x))?;
+            let scene = commit_watched(builder, &|x| progress(done + share * x))?;
             done += share;
             Ok::<_, EmbreeError>(scene)
         };
@@ -100,11 +104,14 @@ impl EmbreeAccel {
         }
         let mut builder = SceneBuilder::new(device, flags, quality)?;
         attach_group(&mut builder, device, &world.root, quality)?;
-        let sets = world
-            .sets
-            .iter()
-            .map(|set| attach_set(&mut builder, device, &prototypes[set.prototype as usize], set))
-            .collect::<Result<Vec<_>, EmbreeError>>()?;
+        let mut next_id = world.root.geometries.len() as u32;
+        let mut sets = Vec::with_capacity(world.sets.len());
+        for set in &world.sets {
+            let ids = SetIds { first: next_id, is_array: set.transforms.len() > ARRAY_FROM };
+            next_id +=
+                attach_set(&mut builder, device, &prototypes[set.prototype as usize], set, ids)?;
+            sets.push(ids);
+        }
         let scene = commit(builder, size(&world.root))?;
         Ok(Self { scene, packet_width: device.packet_width(), sets })
     }
@@ -283,23 +290,53 @@ fn attach_group(
     Ok(())
 }
 
+/// Attaches the copies of a set and returns how many ids they took.
 fn attach_set(
     builder: &mut SceneBuilder,
     device: &Device,
     prototype: &Scene,
     set: &InstanceSet,
-) -> Result<SetIds, EmbreeError> {
-    if set.transforms.len() > ARRAY_FROM {
+    ids: SetIds,
+) -> Result<u32, EmbreeError> {
+    if ids.is_array {
         let transforms = Arc::clone(&set.transforms);
         let array = embree::Geometry::instance_array(device, prototype, transforms)?;
-        return Ok(SetIds { first: builder.attach(array), is_array: true });
+        assert_eq!(builder.attach(array), ids.first, "Embree numbers geometries in order");
+        return Ok(1);
     }
-    let mut first = INVALID_ID;
-    for transform in set.transforms.iter() {
+    for (i, transform) in (0u32..).zip(set.transforms.iter()) {
         let id = builder.attach(embree::Geometry::instance(device, prototype, transform)?);
-        first = first.min(id);
+        assert_eq!(id, ids.first + i, "Embree numbers geometries in order");
     }
-    Ok(SetIds { first, is_array: false })
+    Ok(set.transforms.len() as u32)
+}
+
+/// Builds while `progress` is told, now and then and on a thread of its own, how far it is.
+fn commit_watched(
+    builder: SceneBuilder,
+    progress: &(dyn Fn(f64) -> bool + Sync),
+) -> Result<Scene, EmbreeError> {
+    const EVERY: Duration = Duration::from_millis(20);
+    let state = BuildProgress::default();
+    if !progress(0.0) {
+        return Err(EmbreeError::Cancelled);
+    }
+    let is_over = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let watcher = scope.spawn(|| {
+            thread::park_timeout(EVERY);
+            while !is_over.load(Ordering::Acquire) {
+                if !progress(state.done()) {
+                    state.stop();
+                }
+                thread::park_timeout(EVERY);
+            }
+        });
+        let scene = builder.commit_with(&state);
+        is_over.store(true, Ordering::Release);
+        watcher.thread().unpark();
+        scene
+    })
 }
 
 /// The box of a sphere, rounded outward to f32.

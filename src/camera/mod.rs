@@ -49,13 +49,15 @@ impl Pose {
         Some(Self { eye, right, up: right.cross(forward), forward })
     }
 
-    /// From a camera-to-world matrix that looks along −Z with +Y up; its scale is ignored. None where
-    /// the axes do not span space.
+    /// From a camera-to-world matrix that looks along −Z with +Y up; its scale is ignored, a mirror
+    /// mirrors the picture. None where the axes are not at right angles.
     pub fn from_matrix(m: &DMat4) -> Option<Self> {
         let right = m.x_axis.truncate().try_normalize()?;
         let forward = (-m.z_axis.truncate()).try_normalize()?;
         let up = m.y_axis.truncate().try_normalize()?;
-        if right.cross(up).dot(-forward).abs() < 1e-9 {
+        // A shear would make the picture oblique.
+        let square = |a: DVec3, b: DVec3| a.dot(b).abs() < 1e-6;
+        if !(square(right, up) && square(up, forward) && square(forward, right)) {
             return None;
         }
         Some(Self { eye: m.w_axis.truncate(), right, up, forward })

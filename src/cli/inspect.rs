@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::args::InspectArgs;
 use super::report::peak_bytes;
 use super::units::{grouped, megabytes};
-use super::{Failure, Outcome, job};
+use super::{Failure, Outcome, job, print};
 use crate::scene::Scene;
 
 /// Loads and builds the scene, and prints what it finds.
@@ -20,18 +20,22 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
     let scene = job::thread_pool(args)?.install(|| job::build(args, loaded))?;
     let build = clock.elapsed().as_secs_f64();
 
-    println!("{}", args.scene.display());
-    for (name, value) in facts(&scene, hash) {
-        println!("  {name:<12} {value}");
-    }
     let info = scene.accel.info();
-    println!("  {:<12} read {read:.3} s, build {build:.3} s", "cost");
-    println!(
-        "  {:<12} {} in {info}, {} at most in all",
-        "",
-        megabytes(info.bytes),
-        megabytes(peak_bytes())
-    );
+    print(&args.scene.display().to_string());
+    let costs = [
+        ("cost", format!("read {read:.3} s, build {build:.3} s")),
+        (
+            "",
+            format!(
+                "{} in {info}, {} at most in all",
+                megabytes(info.bytes),
+                megabytes(peak_bytes())
+            ),
+        ),
+    ];
+    for (name, value) in facts(&scene, hash).into_iter().chain(costs) {
+        print(&format!("  {name:<12} {value}"));
+    }
     Ok(Outcome::Done)
 }
 
@@ -63,7 +67,7 @@ fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
         let copies = counted(r.copies, "copy", "copies").unwrap_or_default();
         fact(
             "instances",
-            format!("{copies} of {prototypes}, {} primitives drawn", grouped(r.drawn_primitives)),
+            format!("{copies} of {prototypes}, primitives drawn: {}", grouped(r.drawn_primitives)),
         );
     }
     let b = scene.bounds.translated(scene.center);
@@ -101,7 +105,7 @@ fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
         required.push("shadow rays, as there are lights".to_owned());
     }
     if r.specular_materials > 0 {
-        required.push(format!("highlights, as {} materials have them", r.specular_materials));
+        required.push("highlights, as there are specular materials".to_owned());
     }
     if r.spheres > 0 {
         required.push("user geometry, as there are spheres".to_owned());

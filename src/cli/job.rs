@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::args::{RenderArgs, SceneArgs};
 use super::progress::{Progress, catch_interrupts, interrupted};
-use super::{Failure, Outcome, report};
+use super::{Failure, Outcome, print, report, tell};
 use crate::accel::{AccelError, BuildOptions};
 use crate::film::PixelRect;
 use crate::io::{
@@ -46,18 +46,18 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     if !args.exposure.is_finite() {
         return Err(Failure::BadInput("--exposure must be a finite number".to_owned()));
     }
-    for path in outputs.iter().map(|o| &o.path).chain(&args.stats) {
-        check_writable(path).map_err(|e| Failure::BadInput(e.to_string()))?;
-    }
+    check_targets(&args.scene.scene, outputs.iter().map(|o| &o.path).chain(&args.stats))?;
     catch_interrupts();
     let mut phases = Phases::default();
     let clock = Instant::now();
-    let loaded = load(&args.scene)?;
+    let pool = thread_pool(&args.scene)?;
+    let loaded = pool.install(|| load(&args.scene))?;
     phases.read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
-    let crop = args.crop.map(|crop| check_crop(crop, loaded.scene.image.size)).transpose()?;
+    let size = loaded.scene.image.size;
+    let crop = args.crop.map(|crop| check_crop(crop, size)).transpose()?;
+    check_memory(&crop.unwrap_or(PixelRect::whole(size)))?;
 
-    let pool = thread_pool(&args.scene)?;
     let clock = Instant::now();
     let scene = pool.install(|| build(&args.scene, loaded))?;
     phases.build = clock.elapsed().as_secs_f64();
@@ -103,11 +103,11 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         tell_non_finite(&rendered);
         report::print_table(&phases, &rendered, &accel);
         for output in &outputs {
-            println!("{:>10}  {}", "wrote", output.path.display());
+            print(&format!("{:>10}  {}", "wrote", output.path.display()));
         }
     }
     if rendered.interrupted {
-        eprintln!("alhazen: interrupted; the picture holds what was finished, the rest is black");
+        tell("interrupted; the picture holds what was finished, the rest is black");
         return Ok(Outcome::Interrupted);
     }
     Ok(Outcome::Done)
@@ -129,7 +129,54 @@ pub(super) fn load(args: &SceneArgs) -> Result<LoadedScene, Failure> {
     settings.precision = args.precision.unwrap_or(settings.precision);
     settings.build_quality = args.build_quality.unwrap_or(settings.build_quality);
     settings.filter = args.filter.unwrap_or(settings.filter);
+    // Flags and fields that say the same are the same scene.
+    let said = format!("{:016x} {:?} {:?}", loaded.hash, scene.image, scene.settings);
+    loaded.hash = xxhash_rust::xxh3::xxh3_64(said.as_bytes());
     Ok(loaded)
+}
+
+/// Finds out before any work that every file could be written, and that none is written twice or over
+/// the scene.
+fn check_targets<'a>(
+    scene: &Path,
+    targets: impl Iterator<Item = &'a PathBuf>,
+) -> Result<(), Failure> {
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let mut taken = vec![real(scene)];
+    for path in targets {
+        check_writable(path).map_err(|e| Failure::BadInput(e.to_string()))?;
+        // A file that is not there yet is told by its folder.
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let place = path
+            .canonicalize()
+            .unwrap_or_else(|_| real(folder).join(path.file_name().unwrap_or_default()));
+        if taken.contains(&place) {
+            let message = format!("{}: would be written twice, or over the scene", path.display());
+            return Err(Failure::BadInput(message));
+        }
+        taken.push(place);
+    }
+    Ok(())
+}
+
+/// Refuses a picture that does not fit into memory, before the machine starts to swap.
+fn check_memory(window: &PixelRect) -> Result<(), Failure> {
+    // Mean and error of a pixel, and what the encoders need beside them.
+    let needed = window.area() as u64 * 40;
+    let status = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
+    let free = line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<u64>().ok());
+    match free.map(|kilobytes| kilobytes * 1024) {
+        Some(free) if needed > free => Err(Failure::BadInput(format!(
+            "a picture of {} x {} pixels needs {:.0} GB, and {:.0} GB of memory are free; \
+             accepted: a smaller --size, or a part of it by --crop",
+            window.width(),
+            window.height(),
+            needed as f64 / 1e9,
+            free as f64 / 1e9
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Builds the scene, showing progress.
@@ -154,7 +201,12 @@ pub(super) fn build(args: &SceneArgs, loaded: LoadedScene) -> Result<Scene, Fail
         [SceneError::Accel(AccelError::Interrupted)] => Failure::Interrupted,
         [SceneError::Accel(error)] => Failure::Failed(error.to_string()),
         errors => {
-            let lines: Vec<String> = errors.iter().map(ToString::to_string).collect();
+            const SHOWN: usize = 50;
+            let mut lines: Vec<String> =
+                errors.iter().take(SHOWN).map(ToString::to_string).collect();
+            if errors.len() > SHOWN {
+                lines.push(format!("and {} more", errors.len() - SHOWN));
+            }
             Failure::BadInput(lines.join("\n"))
         }
     })
@@ -170,8 +222,10 @@ pub(super) fn thread_pool(args: &SceneArgs) -> Result<rayon::ThreadPool, Failure
 
 fn outputs(args: &RenderArgs) -> Result<Vec<Output>, Failure> {
     let paths = if args.output.is_empty() {
-        let stem = args.scene.scene.file_stem().unwrap_or_else(|| "picture".as_ref());
-        vec![Path::new(stem).with_extension("exr")]
+        let mut name =
+            args.scene.scene.file_stem().unwrap_or_else(|| "picture".as_ref()).to_owned();
+        name.push(".exr");
+        vec![PathBuf::from(name)]
     } else {
         args.output.clone()
     };
@@ -203,7 +257,7 @@ fn check_crop(crop: PixelRect, size: [u32; 2]) -> Result<PixelRect, Failure> {
 }
 
 pub(super) fn warn(text: &str) {
-    eprintln!("alhazen: warning: {text}");
+    tell(&format!("warning: {text}"));
 }
 
 fn tell_non_finite(rendered: &Rendered) {

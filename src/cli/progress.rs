@@ -26,7 +26,7 @@ pub(super) fn catch_interrupts() {
         }
     });
     if let Err(error) = caught {
-        eprintln!("alhazen: warning: Ctrl-C will end the program at once: {error}");
+        super::tell(&format!("warning: Ctrl-C will end the program at once: {error}"));
     }
 }
 
@@ -88,7 +88,12 @@ impl Progress {
                 if last.elapsed() > LINE_EVERY {
                     *last = Instant::now();
                     let left = if done > 0.0 { seconds / done - seconds } else { f64::INFINITY };
-                    eprintln!("{}: {:.0} %, {left:.0} s left {}", self.phase, 100.0 * done, rate());
+                    super::tell(&format!(
+                        "{}: {:.0} %, {left:.0} s left {}",
+                        self.phase,
+                        100.0 * done,
+                        rate()
+                    ));
                 }
             }
         }

@@ -1,12 +1,11 @@
 //! What a render says at the end: a table for people, JSON for programs, attributes for the EXR.
 
-use std::io::Write;
 use std::path::Path;
 
 use serde::Serialize;
 
 use super::units::{grouped, megabytes};
-use super::{Failure, job::Phases};
+use super::{Failure, job::Phases, print};
 use crate::accel::AccelInfo;
 use crate::io::{Attribute, AttributeValue};
 use crate::render::{RenderJob, Rendered};
@@ -73,11 +72,7 @@ pub(super) fn write_stats(
 /// Prints the closing table.
 pub(super) fn print_table(phases: &Phases, rendered: &Rendered, accel: &AccelInfo) {
     let film = &rendered.film;
-    let mut out = std::io::stdout().lock();
-    let mut line = |name: &str, value: String| {
-        // Nobody listens any more: not worth an error.
-        let _ = writeln!(out, "{name:>10}  {value}");
-    };
+    let line = |name: &str, value: String| print(&format!("{name:>10}  {value}"));
     let (w, h) = (film.window.width(), film.window.height());
     line("picture", format!("{w} x {h}, {} per pixel", plural(rendered.samples, "sample")));
     line(

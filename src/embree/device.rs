@@ -165,11 +165,16 @@ impl Device {
     /// native packet width, the processor and the configuration.
     pub fn isa(&self) -> Isa {
         let at_most = self.0.isa.unwrap_or(Isa::Avx512);
+        #[cfg(target_arch = "x86_64")]
+        let (avx2, sse42) = (is_x86_feature_detected!("avx2"), is_x86_feature_detected!("sse4.2"));
+        // Elsewhere Embree maps its SSE4.2 and AVX2 paths onto the processor's own vectors.
+        #[cfg(not(target_arch = "x86_64"))]
+        let (avx2, sse42) = (true, true);
         let widest = match self.packet_width() {
             16 => Isa::Avx512,
-            8 if is_x86_feature_detected!("avx2") => Isa::Avx2,
+            8 if avx2 => Isa::Avx2,
             8 => Isa::Avx,
-            _ if is_x86_feature_detected!("sse4.2") => Isa::Sse42,
+            _ if sse42 => Isa::Sse42,
             _ => Isa::Sse2,
         };
         widest.min(at_most)
@@ -224,8 +229,9 @@ impl Device {
 
 impl Drop for Inner {
     fn drop(&mut self) {
-        // SAFETY: `raw` is live and this is our only reference. The callbacks are taken off first:
-        // a scene that outlives this device keeps the native device alive, but not the monitor.
+        // SAFETY: `raw` is live and this is our only reference. Every scene and geometry of ours holds
+        // a `Device`, so none is left and no callback can be running; they are taken off all the same
+        // before the monitor that they point to is freed.
         unsafe {
             sys::rtcSetDeviceErrorFunction(self.raw.as_ptr(), None, std::ptr::null_mut());
             sys::rtcSetDeviceMemoryMonitorFunction(self.raw.as_ptr(), None, std::ptr::null_mut());
@@ -259,9 +265,13 @@ unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, post: bool) -> b
     // SAFETY: as in `on_error`.
     let monitor = unsafe { &*user.cast::<Monitor>() };
     let now = monitor.bytes.fetch_add(bytes as i64, Ordering::Relaxed) + bytes as i64;
-    monitor.peak.fetch_max(now, Ordering::Relaxed);
     // What is already allocated (`post`) can only be counted.
-    post || bytes <= 0 || monitor.limit.is_none_or(|limit| now <= limit)
+    if !post && bytes > 0 && monitor.limit.is_some_and(|limit| now > limit) {
+        monitor.bytes.fetch_sub(bytes as i64, Ordering::Relaxed);
+        return false;
+    }
+    monitor.peak.fetch_max(now, Ordering::Relaxed);
+    true
 }
 
 #[cfg(test)]

@@ -29,6 +29,9 @@ pub enum EmbreeError {
         /// Its length.
         got: usize,
     },
+    /// A scene that holds instances cannot be instanced in turn: Debian's Embree has one level.
+    #[error("a scene that holds instances cannot be instanced")]
+    NestedInstances,
     /// A geometry or an instanced scene belongs to another device than its scene.
     #[error("geometry and scene belong to different Embree devices")]
     ForeignDevice,

@@ -40,6 +40,7 @@ pub type Transform3x4 = [f32; 12];
 pub struct Geometry {
     raw: NonNull<sys::RTCGeometryTy>,
     device: Device,
+    is_instance: bool,
     /// What Embree reads through `raw`: buffers, callback context, instanced scene.
     _keep: Vec<Arc<dyn Any + Send + Sync>>,
 }
@@ -77,10 +78,10 @@ impl Geometry {
             }
         }
         let mut geometry = Self::new(device, sys::RTC_GEOMETRY_TYPE_TRIANGLE)?;
-        // SAFETY: both buffers are kept by the geometry and, being in an Arc that Embree's share
-        // makes non-unique, can neither move nor change. The sizes are those of the vectors; the
-        // one read past the last vertex (4 bytes) falls into the padding checked above. Embree
-        // itself checks indices against the vertex count.
+        // SAFETY: both buffers are kept by the geometry, from whose `_keep` no `&mut` is ever taken;
+        // other owners of the Arcs share them with it, so nobody can move or change them. The sizes
+        // are those of the vectors; the one read past the last vertex (4 bytes) falls into the padding
+        // checked above. Embree itself checks indices against the vertex count.
         unsafe {
             sys::rtcSetSharedGeometryBuffer(
                 geometry.raw(),
@@ -138,10 +139,11 @@ impl Geometry {
         geometry.commit("set up user shapes")
     }
 
-    /// One copy of a committed scene. Scenes that hold instances cannot be instanced in turn.
+    /// One copy of a committed scene.
     ///
     /// # Errors
-    /// [`EmbreeError::ForeignDevice`] where `scene` was made on another device.
+    /// [`EmbreeError::ForeignDevice`] where `scene` was made on another device,
+    /// [`EmbreeError::NestedInstances`] where it holds instances itself.
     pub fn instance(
         device: &Device,
         scene: &Scene,
@@ -199,10 +201,14 @@ impl Geometry {
         if !scene.device().is(&self.device) {
             return Err(EmbreeError::ForeignDevice);
         }
+        if scene.has_instances() {
+            return Err(EmbreeError::NestedInstances);
+        }
         // SAFETY: both handles are live. Embree counts a reference to the scene; we keep the scene's
         // own buffers as well.
         unsafe { sys::rtcSetGeometryInstancedScene(self.raw(), scene.raw()) };
         self._keep.push(Arc::new(scene.clone()));
+        self.is_instance = true;
         Ok(())
     }
 
@@ -211,7 +217,9 @@ impl Geometry {
         let raw = unsafe { sys::rtcNewGeometry(device.raw(), kind) };
         match NonNull::new(raw) {
             // Owned from here on, so that no error path leaks.
-            Some(raw) => Ok(Self { raw, device: device.clone(), _keep: Vec::new() }),
+            Some(raw) => {
+                Ok(Self { raw, device: device.clone(), is_instance: false, _keep: Vec::new() })
+            }
             None => Err(device.check("make a geometry").err().unwrap_or(EmbreeError::Native {
                 doing: "make a geometry",
                 code: super::ErrorCode(sys::RTC_ERROR_UNKNOWN),
@@ -229,6 +237,10 @@ impl Geometry {
 
     pub(super) fn raw(&self) -> sys::RTCGeometry {
         self.raw.as_ptr()
+    }
+
+    pub(super) const fn is_instance(&self) -> bool {
+        self.is_instance
     }
 
     pub(super) fn device(&self) -> &Device {

@@ -4,6 +4,7 @@ use std::ffi::c_void;
 use std::ops::BitOr;
 use std::ptr::{NonNull, null_mut};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use super::device::Device;
 use super::error::{EmbreeError, ErrorCode};
@@ -104,35 +105,55 @@ impl SceneBuilder {
         Ok(Scene(Arc::new(self.scene)))
     }
 
-    /// As [`SceneBuilder::commit`], reporting progress from 0 to 1; the build ends when `progress`
-    /// returns false. It may be called from several of Embree's threads at once, and must not panic.
+    /// As [`SceneBuilder::commit`], telling `progress` how far it is, and ending when that says so.
     ///
     /// # Errors
-    /// [`EmbreeError::Cancelled`] where `progress` returned false, else as [`SceneBuilder::commit`].
-    pub fn commit_with<F>(self, progress: &F) -> Result<Scene, EmbreeError>
-    where
-        F: Fn(f64) -> bool + Sync,
-    {
-        unsafe extern "C" fn report<F: Fn(f64) -> bool + Sync>(
-            user: *mut c_void,
-            done: f64,
-        ) -> bool {
-            // SAFETY: `user` is the `&F` of the enclosing call, which outlives the commit.
-            let progress = unsafe { &*user.cast::<F>() };
-            progress(done)
-        }
+    /// [`EmbreeError::Cancelled`] where it was asked to stop, else as [`SceneBuilder::commit`].
+    pub fn commit_with(self, progress: &BuildProgress) -> Result<Scene, EmbreeError> {
         let user = std::ptr::from_ref(progress).cast_mut().cast();
         let raw = self.scene.raw.as_ptr();
-        // SAFETY: the scene is live; the callback only reads `progress`, which is Sync and borrowed
-        // until the callback is taken off again below.
-        unsafe { sys::rtcSetSceneProgressMonitorFunction(raw, Some(report::<F>), user) };
-        // SAFETY: as in `commit`.
+        // SAFETY: the scene is live; the callback only reads `progress`, which is made of atomics and
+        // borrowed until the callback is taken off again below.
+        unsafe { sys::rtcSetSceneProgressMonitorFunction(raw, Some(on_progress), user) };
+        // SAFETY: as in `commit`. A build that is cancelled leaves the scene uncommitted, which may
+        // be released like any other.
         unsafe { sys::rtcCommitScene(raw) };
         // SAFETY: the scene is live.
         unsafe { sys::rtcSetSceneProgressMonitorFunction(raw, None, null_mut()) };
         self.scene.device.check("build the hierarchy")?;
         Ok(Scene(Arc::new(self.scene)))
     }
+}
+
+/// How far a build is, and whether it should end; to be watched from another thread.
+///
+/// Not a closure: Embree calls back from its build threads with denormals flushed to zero, where
+/// Rust's arithmetic is not what it says, so nothing runs there but a store and a load.
+#[derive(Debug, Default)]
+pub struct BuildProgress {
+    /// From 0 to 1, as the bits of an f64.
+    done: AtomicU64,
+    stop: AtomicBool,
+}
+
+impl BuildProgress {
+    /// The share that is done, from 0 to 1.
+    pub fn done(&self) -> f64 {
+        f64::from_bits(self.done.load(Ordering::Relaxed))
+    }
+
+    /// Asks the build to end.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Called by Embree during a build, perhaps on several threads at once.
+unsafe extern "C" fn on_progress(user: *mut c_void, done: f64) -> bool {
+    // SAFETY: `user` is the `&BuildProgress` of `commit_with`, which outlives the commit.
+    let progress = unsafe { &*user.cast::<BuildProgress>() };
+    progress.done.store(done.to_bits(), Ordering::Relaxed);
+    !progress.stop.load(Ordering::Relaxed)
 }
 
 impl Scene {
@@ -238,6 +259,10 @@ impl Scene {
             lower: [b.lower_x, b.lower_y, b.lower_z],
             upper: [b.upper_x, b.upper_y, b.upper_z],
         }
+    }
+
+    pub(super) fn has_instances(&self) -> bool {
+        self.0.geometries.iter().any(Geometry::is_instance)
     }
 
     /// The device that the scene was made on.

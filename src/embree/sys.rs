@@ -6,7 +6,8 @@
 include!(concat!(env!("OUT_DIR"), "/embree.rs"));
 
 // `rtcIntersect1` and friends require these alignments.
-const _: () = assert!(align_of::<RTCRayHit>() == 16);
+const _: () = assert!(align_of::<RTCRay>() == 16 && align_of::<RTCRayHit>() == 16);
+const _: () = assert!(align_of::<RTCBounds>() == 16);
 const _: () = assert!(align_of::<RTCRayHit16>() == 64);
 // The header says "no id" with a C cast, which bindgen does not evaluate.
 const _: () = assert!(super::INVALID_ID == !0);

@@ -10,7 +10,6 @@
 //! overstate the error 3 to 50 times.
 
 use crate::color::Rgb;
-use crate::sampler::REPLICATES;
 
 /// Pixels of a block: 4 × 4, in rows.
 pub const BLOCK_LANES: usize = 16;
@@ -74,18 +73,24 @@ impl Replicate {
 }
 
 /// Adds up the samples of one block of 4 × 4 pixels. Reusable, so that a thread allocates once.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct BlockAccumulator {
-    replicates: [Replicate; REPLICATES as usize],
+    replicates: Vec<Replicate>,
 }
 
 impl BlockAccumulator {
+    /// For samples of which number i belongs to replicate i mod `replicates`.
+    pub fn new(replicates: u32) -> Self {
+        Self { replicates: (0..replicates).map(|_| Replicate::default()).collect() }
+    }
+
     /// Forgets everything; the next sample is number `first_sample`.
     pub fn restart(&mut self, first_sample: u32) {
+        let replicates = self.replicates.len() as u32;
         for (r, replicate) in (0u32..).zip(&mut self.replicates) {
             replicate.nodes.clear();
             // Samples of this replicate below `first_sample`.
-            replicate.end = first_sample / REPLICATES + u32::from(r < first_sample % REPLICATES);
+            replicate.end = first_sample / replicates + u32::from(r < first_sample % replicates);
         }
     }
 
@@ -107,19 +112,20 @@ impl BlockAccumulator {
                 dropped |= 1 << lane;
             }
         }
-        let replicate = &mut self.replicates[(index % REPLICATES) as usize];
-        debug_assert_eq!(replicate.end, index / REPLICATES, "samples come in order");
+        let replicates = self.replicates.len() as u32;
+        let replicate = &mut self.replicates[(index % replicates) as usize];
+        debug_assert_eq!(replicate.end, index / replicates, "samples come in order");
         replicate.push(leaf);
         dropped
     }
 
-    /// Mean and variance of the mean of every pixel.
+    /// Mean of every pixel, and the standard error of the mean.
     pub fn finish(&self, origin: [u32; 2]) -> BlockPixels {
-        let totals = self.replicates.each_ref().map(Replicate::total);
+        let totals: Vec<Node> = self.replicates.iter().map(Replicate::total).collect();
         let mut pixels = BlockPixels {
             origin,
             mean: [Rgb::BLACK; BLOCK_LANES],
-            variance: [Rgb::BLACK; BLOCK_LANES],
+            standard_error: [Rgb::splat(f32::NAN); BLOCK_LANES],
         };
         for lane in 0..BLOCK_LANES {
             let count: u32 = totals.iter().map(|t| t.count[lane]).sum();
@@ -141,7 +147,7 @@ impl BlockAccumulator {
                     });
                     spread.sum::<f64>() / (n * degrees)
                 });
-                pixels.variance[lane] = variance.map(|x| x as f32).into();
+                pixels.standard_error[lane] = variance.map(|x| x.sqrt() as f32).into();
             }
         }
         pixels
@@ -155,8 +161,9 @@ pub struct BlockPixels {
     pub origin: [u32; 2],
     /// Mean radiance, in rows of 4.
     pub mean: [Rgb; BLOCK_LANES],
-    /// Variance of that mean.
-    pub variance: [Rgb; BLOCK_LANES],
+    /// Standard error of that mean; NaN where the samples do not show it: fewer than two replicates
+    /// have any.
+    pub standard_error: [Rgb; BLOCK_LANES],
 }
 
 #[cfg(test)]
@@ -164,7 +171,7 @@ mod tests {
     use super::*;
 
     fn accumulate(n: u32, value: impl Fn(u32) -> f32) -> BlockPixels {
-        let mut block = BlockAccumulator::default();
+        let mut block = BlockAccumulator::new(4);
         block.restart(0);
         for i in 0..n {
             assert_eq!(block.add(i, u16::MAX, &[Rgb::splat(value(i)); BLOCK_LANES]), 0);
@@ -177,7 +184,7 @@ mod tests {
         // 0.1 as f32, a million times: the mean is 0.1 to the last bit.
         let pixels = accumulate(1_000_000, |_| 0.1);
         assert_eq!(pixels.mean[5], Rgb::splat(0.1));
-        assert_eq!(pixels.variance[5], Rgb::BLACK);
+        assert_eq!(pixels.standard_error[5], Rgb::BLACK);
         // A huge sample among small ones: sum = 1e8 + 999,999 · 0.25, known exactly.
         let pixels = accumulate(1_000_000, |i| if i == 77 { 1e8 } else { 0.25 });
         assert_eq!(pixels.mean[0].r, ((1e8 + 999_999.0 * 0.25) / 1e6) as f32);
@@ -186,14 +193,16 @@ mod tests {
     #[test]
     fn the_error_is_that_of_the_replicates() {
         // Replicate r is constant with value r, so the means are 0, 1, 2, 3: variance of their mean 5/12.
-        let pixels = accumulate(64, |i| (i % REPLICATES) as f32);
+        let pixels = accumulate(64, |i| (i % 4) as f32);
         assert_eq!(pixels.mean[3].g, 1.5);
-        assert!((pixels.variance[3].g - 5.0 / 12.0).abs() < 1e-6);
+        assert!((pixels.standard_error[3].g - (5f32 / 12.0).sqrt()).abs() < 1e-6);
+        // A single replicate shows nothing.
+        assert!(accumulate(1, |_| 1.0).standard_error[3].g.is_nan());
     }
 
     #[test]
     fn values_that_are_not_finite_are_left_out() {
-        let mut block = BlockAccumulator::default();
+        let mut block = BlockAccumulator::new(4);
         block.restart(0);
         let mut radiance = [Rgb::splat(2.0); BLOCK_LANES];
         radiance[3] = Rgb::new(0.0, f32::NAN, 0.0);

@@ -89,7 +89,7 @@ pub struct FilterTable {
     inverse: Vec<f32>,
     /// Where the filter is negative: outside ±this.
     zero: f32,
-    /// ∫|f| / ∫f along one axis.
+    /// ∫|f| / ∫f along one axis, as the table has it.
     scale: f32,
 }
 
@@ -99,12 +99,12 @@ impl FilterTable {
         if filter == Filter::Box {
             return Self { inverse: Vec::new(), zero: 0.5, scale: 1.0 };
         }
-        // Integrals of f and |f| by the midpoint rule, much finer than the table.
+        // ∫|f| by the midpoint rule, much finer than the table.
         let (steps, r) = (64 * CELLS, filter.radius());
         let width = 2.0 * r / steps as f64;
         let values: Vec<f64> =
             (0..steps).map(|i| filter.value(-r + (i as f64 + 0.5) * width)).collect();
-        let (signed, total) = values.iter().fold((0.0, 0.0), |(s, t), v| (s + v, t + v.abs()));
+        let total: f64 = values.iter().map(|v| v.abs()).sum();
         let mut inverse = Vec::with_capacity(CELLS + 1);
         let mut below = 0.0;
         for (i, v) in values.iter().enumerate() {
@@ -120,8 +120,16 @@ impl FilterTable {
             below = above;
         }
         inverse.resize(CELLS + 1, r as f32);
-        let zero = if filter == Filter::Mitchell { mitchell_zero() } else { r };
-        Self { inverse, zero: zero as f32, scale: (total / signed) as f32 }
+        let zero = if filter == Filter::Mitchell { mitchell_zero() } else { r } as f32;
+        // From the table itself, so that weights average to exactly 1 and a constant stays as it is.
+        let negative = |cell: &[f32]| {
+            let (a, b) = (f64::from(cell[0]), f64::from(cell[1]));
+            let outside =
+                (f64::from(-zero) - a).clamp(0.0, b - a) + (b - f64::from(zero)).clamp(0.0, b - a);
+            if b > a { outside / (b - a) } else { 0.0 }
+        };
+        let share = inverse.windows(2).map(negative).sum::<f64>() / CELLS as f64;
+        Self { inverse, zero, scale: (1.0 / (1.0 - 2.0 * share)) as f32 }
     }
 
     /// Draws a position from two numbers in [0, 1).
@@ -183,6 +191,20 @@ mod tests {
                 let (d, e) = (drawn[k], exact[k] / exact[0]);
                 assert!((d - e).abs() < 2e-3, "{} moment {k}: {d} against {e}", filter.name());
             }
+        }
+    }
+
+    #[test]
+    fn weights_average_to_one() {
+        for filter in Filter::ALL {
+            let table = FilterTable::new(filter);
+            let n = 1 << 20;
+            let sum: f64 = (0..n)
+                .map(|i| f64::from(table.sample([(i as f32 + 0.5) / n as f32, 0.5]).weight))
+                .sum();
+            // The second axis is drawn at its centre, where the weight is the positive one.
+            let mean = sum / f64::from(n) / f64::from(table.scale);
+            assert!((mean - 1.0).abs() < 1e-5, "{}: {mean}", filter.name());
         }
     }
 

@@ -57,7 +57,7 @@ impl PixelRect {
     }
 }
 
-/// A finished picture: the mean radiance of every pixel, and the variance of that mean.
+/// A finished picture: the mean radiance of every pixel, and how sure it is.
 #[derive(Debug, Clone)]
 pub struct Film {
     /// Size of the whole picture, in pixels.
@@ -66,25 +66,26 @@ pub struct Film {
     pub window: PixelRect,
     /// Mean radiance, row by row over the window.
     pub mean: Vec<Rgb>,
-    /// Estimated variance of that mean, in the same order; none where one sample a pixel gives no estimate.
-    pub variance: Option<Vec<Rgb>>,
+    /// Estimated standard error of that mean, in the same order, NaN where a pixel's samples show none;
+    /// no plane where one sample a pixel shows it nowhere.
+    pub standard_error: Option<Vec<Rgb>>,
 }
 
 impl Film {
-    /// A black film; with room for variances where `with_variance`.
-    pub fn new(size: [u32; 2], window: PixelRect, with_variance: bool) -> Self {
-        let black = vec![Rgb::BLACK; window.area()];
-        Self { size, window, variance: with_variance.then(|| black.clone()), mean: black }
+    /// A black film; with a plane for errors where `with_error`.
+    pub fn new(size: [u32; 2], window: PixelRect, with_error: bool) -> Self {
+        let plane = || vec![Rgb::BLACK; window.area()];
+        Self { size, window, mean: plane(), standard_error: with_error.then(plane) }
     }
 
     /// Writes the pixels of a block that lie inside the window.
     pub fn put(&mut self, block: &BlockPixels) {
-        for (lane, (&mean, &variance)) in block.mean.iter().zip(&block.variance).enumerate() {
+        for (lane, (&mean, &error)) in block.mean.iter().zip(&block.standard_error).enumerate() {
             let [x, y] = [block.origin[0] + lane as u32 % 4, block.origin[1] + lane as u32 / 4];
             if let Some(i) = self.index(x, y) {
                 self.mean[i] = mean;
-                if let Some(plane) = &mut self.variance {
-                    plane[i] = variance;
+                if let Some(plane) = &mut self.standard_error {
+                    plane[i] = error;
                 }
             }
         }
@@ -101,23 +102,21 @@ impl Film {
     }
 
     /// The relative sampling error of the picture: the root of the mean over pixels and channels of
-    /// Var\[mean\] / (mean² + ε), with ε = 0.01 · (mean luminance)². None without variances.
+    /// Var\[mean\] / (mean² + ε), with ε = 0.01 · (mean luminance)². None where no pixel shows an error.
     pub fn relative_error(&self) -> Option<f64> {
-        let variance = self.variance.as_ref()?;
+        let errors = self.standard_error.as_ref()?;
         let n = self.mean.len().max(1) as f64;
         let luminance = self.mean.iter().map(|c| f64::from(c.luminance())).sum::<f64>() / n;
         let epsilon = 0.01 * luminance * luminance;
-        let sum: f64 = self
-            .mean
-            .iter()
-            .zip(variance)
-            .flat_map(|(m, v)| m.to_array().into_iter().zip(v.to_array()))
-            .map(|(m, v)| {
-                let (m, v) = (f64::from(m), f64::from(v));
-                // A black picture has no error, rather than 0/0.
-                if v == 0.0 { 0.0 } else { v / (m * m + epsilon) }
-            })
-            .sum();
-        Some((sum / (3.0 * n)).sqrt())
+        let values = self.mean.iter().zip(errors).flat_map(|(m, e)| {
+            m.to_array().into_iter().zip(e.to_array()).map(|(m, e)| (f64::from(m), f64::from(e)))
+        });
+        let known = values.filter(|(_, e)| !e.is_nan());
+        let (sum, count) = known.fold((0.0, 0u64), |(sum, count), (m, e)| {
+            // A black picture has no error, rather than 0/0.
+            let share = if e == 0.0 { 0.0 } else { e * e / (m * m + epsilon) };
+            (sum + share, count + 1)
+        });
+        (count > 0).then(|| (sum / count as f64).sqrt())
     }
 }

@@ -13,8 +13,18 @@ use crate::scene::Location;
 #[derive(Debug)]
 struct Source {
     name: Arc<str>,
-    /// The text, for lines and columns; none where a value's place is the source as a whole.
+    /// The text, for columns; none where a value's place is the source as a whole.
     text: Option<String>,
+    /// Offsets at which its lines start.
+    lines: Vec<usize>,
+}
+
+impl Source {
+    fn new(name: &str, text: Option<&str>) -> Self {
+        let ends = text.unwrap_or("").bytes().enumerate().filter(|(_, b)| *b == b'\n');
+        let lines = std::iter::once(0).chain(ends.map(|(i, _)| i + 1)).collect();
+        Self { name: name.into(), text: text.map(str::to_owned), lines }
+    }
 }
 
 /// Where a value stands.
@@ -53,14 +63,33 @@ pub(super) struct Entry {
 }
 
 impl Value {
+    fn is_number(&self) -> bool {
+        matches!(self, Self::Integer(_) | Self::Float(_))
+    }
+
+    fn number_text(&self) -> String {
+        match self {
+            Self::Integer(number) => number.to_string(),
+            // As it could be typed: 1e200, not 201 digits; 2.5, not 2.5e0.
+            Self::Float(number) if *number != 0.0 && !(1e-4..1e9).contains(&number.abs()) => {
+                format!("{number:e}")
+            }
+            Self::Float(number) => number.to_string(),
+            _ => String::new(),
+        }
+    }
+
     /// What a person would call it.
     pub(super) fn kind(&self) -> String {
         match self {
             Self::Table(_) => "a table".into(),
+            Self::Array(items) if items.len() <= 4 && items.iter().all(|i| i.value.is_number()) => {
+                let items: Vec<String> = items.iter().map(|i| i.value.number_text()).collect();
+                format!("[{}]", items.join(", "))
+            }
             Self::Array(items) => format!("a list of {}", items.len()),
             Self::String(text) => format!("the text \"{text}\""),
-            Self::Integer(number) => format!("the number {number}"),
-            Self::Float(number) => format!("the number {number}"),
+            Self::Integer(_) | Self::Float(_) => format!("the number {}", self.number_text()),
             Self::Bool(value) => format!("{value}"),
             Self::Other => "a date".into(),
         }
@@ -80,7 +109,7 @@ impl Document {
         let (table, errors) = DeTable::parse_recoverable(text);
         let mut document = Self {
             root: Node { value: Value::Table(Vec::new()), span: Span { source: 0, start: 0 } },
-            sources: vec![Source { name: name.into(), text: Some(text.to_owned()) }],
+            sources: vec![Source::new(name, Some(text))],
         };
         if !errors.is_empty() {
             let mistakes = errors.iter().map(|error| {
@@ -90,7 +119,9 @@ impl Document {
                     message: error.message().trim().replace('\n', ", "),
                 }
             });
-            return Err(Mistakes(mistakes.collect()));
+            let mut mistakes: Vec<Mistake> = mistakes.collect();
+            mistakes.sort_by_key(|m| m.at.position);
+            return Err(Mistakes(mistakes));
         }
         document.root = Node { value: table_value(table.get_ref(), 0), ..document.root };
         Ok(document)
@@ -105,17 +136,14 @@ impl Document {
         };
         let object = table("mesh", node(Value::String(path.into())));
         let objects = node(Value::Array(vec![node(object)]));
-        Self {
-            root: node(table("objects", objects)),
-            sources: vec![Source { name: path.into(), text: None }],
-        }
+        Self { root: node(table("objects", objects)), sources: vec![Source::new(path, None)] }
     }
 
     /// Lays one `path.to.field=value` over the document. The path may pass through lists by number
     /// (`objects.0.radius`) and makes tables where there are none; the value is TOML, or plain text.
     pub(super) fn set(&mut self, assignment: &str) -> Result<(), Mistake> {
         let source = self.sources.len();
-        self.sources.push(Source { name: format!("--set {assignment}").into(), text: None });
+        self.sources.push(Source::new(&format!("--set {assignment}"), None));
         let span = Span { source, start: 0 };
         let mistake =
             |document: &Self, message: String| Mistake { at: document.locate(span), message };
@@ -171,10 +199,10 @@ impl Document {
     pub(super) fn locate(&self, span: Span) -> Location {
         let source = &self.sources[span.source];
         let position = source.text.as_ref().map(|text| {
-            let before = &text.as_bytes()[..span.start.min(text.len())];
-            let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
-            let line = before.iter().filter(|&&b| b == b'\n').count() + 1;
-            let column = String::from_utf8_lossy(&before[line_start..]).chars().count() + 1;
+            let at = span.start.min(text.len());
+            let line = source.lines.partition_point(|&start| start <= at);
+            let before = &text.as_bytes()[source.lines[line - 1]..at];
+            let column = String::from_utf8_lossy(before).chars().count() + 1;
             (line, column)
         });
         Location { source: Arc::clone(&source.name), position }
@@ -252,10 +280,7 @@ mod tests {
     fn places_are_lines_and_columns() {
         let text = "a = 1\n  ü = [\n 2, 3]\n";
         let document = Document::parse("f.toml", "x = 1").unwrap();
-        let document = Document {
-            sources: vec![Source { name: "f.toml".into(), text: Some(text.into()) }],
-            ..document
-        };
+        let document = Document { sources: vec![Source::new("f.toml", Some(text))], ..document };
         let at = |start| document.locate(Span { source: 0, start }).to_string();
         assert_eq!(at(0), "f.toml:1:1");
         assert_eq!(at(text.find('[').unwrap()), "f.toml:2:7");

@@ -159,7 +159,13 @@ pub fn write_exr(
     image.attributes.chromaticities = Some(REC_709);
 
     write_whole(path, |writer| {
-        image.write().to_buffered(&mut *writer).map_err(|error| match error {
+        // The encoder starts a thread for every core, unless it is told not to.
+        let encoder = if rayon::current_num_threads() == 1 {
+            image.write().non_parallel()
+        } else {
+            image.write()
+        };
+        encoder.to_buffered(&mut *writer).map_err(|error| match error {
             exr::error::Error::Io(e) => WriteError::io(path, "write", e),
             other => WriteError::format(path, other.to_string()),
         })?;
@@ -186,7 +192,7 @@ fn sort_header(file: &File) -> io::Result<()> {
     }
     let corrupt = || io::Error::other("the encoder wrote a header that cannot be read");
     let text_end = |from: usize| {
-        let length = bytes[from..length].iter().position(|&b| b == 0)?;
+        let length = bytes.get(from..length)?.iter().position(|&b| b == 0)?;
         Some(from + length)
     };
     let mut attributes = Vec::new();

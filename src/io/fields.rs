@@ -100,14 +100,11 @@ impl<'d> Reader<'d> {
 
     /// `node` as a finite number.
     pub(super) fn number(&self, node: &Node, name: &str) -> Option<f64> {
-        match node.value {
-            Value::Integer(i) => Some(i as f64),
-            Value::Float(x) if x.is_finite() => Some(x),
-            _ => {
-                self.expected(node, name, "a finite number");
-                None
-            }
+        let number = usable(&node.value);
+        if number.is_none() {
+            self.expected(node, name, "a finite number (within 1e30)");
         }
+        number
     }
 
     /// `node` as a list of `N` finite numbers.
@@ -116,14 +113,12 @@ impl<'d> Reader<'d> {
         match &node.value {
             Value::Array(items) if items.len() == N => {
                 for (to, item) in numbers.iter_mut().zip(items) {
-                    *to = match item.value {
-                        Value::Integer(i) => i as f64,
-                        Value::Float(x) if x.is_finite() => x,
-                        _ => {
-                            self.expected(item, name, &format!("a list of {N} finite numbers"));
-                            return None;
-                        }
+                    let Some(number) = usable(&item.value) else {
+                        let expected = format!("a list of {N} finite numbers (within 1e30)");
+                        self.expected(node, name, &expected);
+                        return None;
                     };
+                    *to = number;
                 }
                 Some(numbers)
             }
@@ -154,12 +149,25 @@ impl<'d> Reader<'d> {
                 return None;
             }
         };
-        if !color.is_finite() || color.to_array().iter().any(|&c| c < 0.0) {
-            self.mistake(node.span, format!("`{name}` must not be negative or beyond f32"));
+        if color.to_array().iter().any(|&c| c < 0.0) {
+            self.mistake(node.span, format!("`{name}` must not be negative"));
             return None;
         }
         Some(color)
     }
+}
+
+/// Numbers beyond this are no lengths, angles or amounts of light; their squares and cubes stay finite.
+const MAX_NUMBER: f64 = 1e30;
+
+/// A number that can be computed with.
+fn usable(value: &Value) -> Option<f64> {
+    let x = match *value {
+        Value::Integer(i) => i as f64,
+        Value::Float(x) => x,
+        _ => return None,
+    };
+    (x.abs() <= MAX_NUMBER).then_some(x)
 }
 
 /// "#rrggbb", an sRGB signal, as linear light.
@@ -242,6 +250,16 @@ impl<'d, 'r> Fields<'d, 'r> {
             return Some(x);
         }
         self.reader.mistake(node.span, format!("`{name}` must be above 0, not {x}"));
+        None
+    }
+
+    /// A number from zero on.
+    pub(super) fn not_negative(&self, node: &Node, name: &str) -> Option<f64> {
+        let x = self.reader.number(node, name)?;
+        if x >= 0.0 {
+            return Some(x);
+        }
+        self.reader.mistake(node.span, format!("`{name}` must not be below 0, as {x} is"));
         None
     }
 

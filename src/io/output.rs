@@ -58,7 +58,7 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     if path.is_dir() {
         return Err(WriteError::format(path, "is a folder; expected a file name"));
     }
-    temporary(path).map(drop)
+    temporary(&path.canonicalize().unwrap_or_else(|_| path.to_owned())).map(drop)
 }
 
 /// Writes `path` through `write`, whole or not at all.
@@ -66,13 +66,19 @@ pub(super) fn write_whole<W>(path: &Path, write: W) -> Result<(), WriteError>
 where
     W: FnOnce(&mut BufWriter<&std::fs::File>) -> Result<(), WriteError>,
 {
-    let file = temporary(path)?;
+    // Through a link to the file that it names, which stays as open or as closed as it was.
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let file = temporary(&target)?;
+    if let Ok(old) = target.metadata() {
+        let failed = |e| WriteError::io(path, "keep the permissions of", e);
+        file.as_file().set_permissions(old.permissions()).map_err(failed)?;
+    }
     let mut writer = BufWriter::with_capacity(1 << 20, file.as_file());
     write(&mut writer)?;
     writer.flush().map_err(|e| WriteError::io(path, "write", e))?;
     drop(writer);
     file.as_file().sync_all().map_err(|e| WriteError::io(path, "write", e))?;
-    file.persist(path)
+    file.persist(&target)
         .map_err(|e| WriteError::io(path, "rename the finished file to it", e.error))?;
     Ok(())
 }
@@ -105,6 +111,19 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         let left = std::fs::read_dir(folder.path()).unwrap().count();
         assert_eq!(left, 1, "the temporary file is gone");
+    }
+
+    #[test]
+    fn links_and_permissions_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link] = ["file.exr", "link.exr"].map(|name| folder.path().join(name));
+        std::fs::write(&file, "old").unwrap();
+        std::fs::set_permissions(&file, Permissions::from_mode(0o600)).unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_text(&link, "new").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(std::fs::read(&file).unwrap(), b"new");
+        assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
     }
 
     #[test]

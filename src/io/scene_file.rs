@@ -27,7 +27,7 @@ pub struct LoadedScene {
     pub scene: SceneDesc,
     /// What a user should know.
     pub warnings: Vec<String>,
-    /// Hash of everything that was read: same hash, same scene.
+    /// Hash of everything that was read.
     pub hash: u64,
 }
 
@@ -80,13 +80,15 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Loa
 }
 
 /// Hash of the text, the options, and all meshes and transforms, whatever file they came from.
+/// Every part goes in with its length, so that no two lists of parts look alike.
 fn hash(scene: &SceneDesc, text: &str, options: &LoadOptions) -> u64 {
     const PART: usize = 1 << 20;
     let mut total = Xxh3::new();
-    total.update(text.as_bytes());
-    for option in options.set.iter().chain(&options.camera) {
-        total.update(option.as_bytes());
-        total.update(&[0]);
+    for text in
+        [text].into_iter().chain(options.set.iter().chain(&options.camera).map(String::as_str))
+    {
+        total.update(&(text.len() as u64).to_le_bytes());
+        total.update(text.as_bytes());
     }
     let objects = scene.prototypes.iter().flat_map(|p| &p.objects).chain(&scene.objects);
     for object in objects {
@@ -105,6 +107,7 @@ fn hash(scene: &SceneDesc, text: &str, options: &LoadOptions) -> u64 {
         add(bytemuck::cast_slice(mesh.positions.as_flat()));
         add(bytemuck::cast_slice(&mesh.triangles));
         add(bytemuck::cast_slice(mesh.normals.as_deref().map_or(&[][..], |n| n)));
+        add(bytemuck::cast_slice(mesh.uvs.as_deref().map_or(&[][..], |uv| uv)));
         add(bytemuck::cast_slice(&mesh.origin.to_array()));
     }
     total.digest()

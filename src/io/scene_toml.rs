@@ -239,6 +239,10 @@ impl<'d, 'r> Interpreter<'d, 'r> {
     }
 
     fn points(&self, node: &'d Node, name: &str) -> Option<Vec<f64>> {
+        if !matches!(node.value, Value::Array(_)) {
+            self.reader.expected(node, name, "a list of points");
+            return None;
+        }
         let points = self.reader.list(node, name).iter();
         let numbers: Option<Vec<[f64; 3]>> =
             points.map(|point| self.reader.numbers::<3>(point, name)).collect();
@@ -272,7 +276,9 @@ impl<'d, 'r> Interpreter<'d, 'r> {
     fn mesh_file(&mut self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<usize> {
         let name = fields.text(node, "mesh")?;
         let path = self.folder.join(name);
-        if let Some(known) = self.meshes.get(&path) {
+        // One file under two names is read once.
+        let key = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if let Some(known) = self.meshes.get(&key) {
             return *known;
         }
         let index = match read_mesh(&path) {
@@ -287,7 +293,7 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 None
             }
         };
-        self.meshes.insert(path, index);
+        self.meshes.insert(key, index);
         index
     }
 
@@ -316,7 +322,15 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                         {
                             transform(self.reader, row)
                         }
-                        _ => self.reader.numbers::<12>(row, "transforms").map(|m| affine(&m)),
+                        Value::Array(items) if items.len() == 12 => {
+                            self.reader.numbers::<12>(row, "transforms").map(|m| affine(&m))
+                        }
+                        _ => {
+                            let expected = "a list of copies, each 12 numbers or a list of steps \
+                                such as [{ translate = [1, 0, 0] }]";
+                            self.reader.expected(row, "transforms", expected);
+                            None
+                        }
                     })
                     .collect::<Option<_>>()?,
                 _ => {
@@ -391,13 +405,9 @@ fn settings(reader: &Reader<'_>, fields: Fields<'_, '_>) -> RenderSettings {
             None => default.epsilon,
             Some(node) => match &node.value {
                 Value::String(text) if text == "auto" => Epsilon::Auto,
-                Value::Integer(_) | Value::Float(_) => {
-                    let epsilon = reader.number(node, "epsilon").filter(|&e| e >= 0.0);
-                    if epsilon.is_none() {
-                        reader.expected(node, "epsilon", "\"auto\" or a distance from 0 on");
-                    }
-                    epsilon.map_or(default.epsilon, |e| Epsilon::Fixed(e as f32))
-                }
+                Value::Integer(_) | Value::Float(_) => fields
+                    .not_negative(node, "epsilon")
+                    .map_or(default.epsilon, |e| Epsilon::Fixed(e as f32)),
                 _ => {
                     reader.expected(node, "epsilon", "\"auto\" or a distance from 0 on");
                     default.epsilon
@@ -419,7 +429,7 @@ fn camera(reader: &Reader<'_>, fields: Fields<'_, '_>) -> CameraDesc {
     let projection = if is_parallel {
         let node = fields.get("height");
         if node.is_none() && (fields.has("eye") || fields.has("transform")) {
-            reader.mistake(fields.span(), "an orthographic camera with an `eye` needs a `height`");
+            reader.mistake(fields.span(), "an orthographic camera that is placed needs a `height`");
         }
         let height = node.and_then(|node| fields.positive(node, "height"));
         // 0: as high as the scene, with the place.
@@ -454,14 +464,16 @@ fn camera(reader: &Reader<'_>, fields: Fields<'_, '_>) -> CameraDesc {
             match (eye, target) {
                 (Some(eye), target) => {
                     // Straight ahead where only the place is given.
-                    let target = target.unwrap_or(eye + DVec3::NEG_Z);
+                    let target = target.unwrap_or(eye - DVec3::Z * (1.0 + eye.length()));
                     Some(PlaceDesc::LookAt { eye, target, up })
                 }
-                (None, Some(_)) => {
-                    reader.mistake(fields.span(), "a camera with a `target` needs an `eye`");
+                (None, None) if !fields.has("up") => None,
+                (None, _) if fields.has("eye") => None,
+                (None, _) => {
+                    reader
+                        .mistake(fields.span(), "a camera with a `target` or `up` needs an `eye`");
                     None
                 }
-                (None, None) => None,
             }
         }
     };
@@ -477,7 +489,7 @@ fn material(fields: Fields<'_, '_>) -> Option<Material> {
         None => return None,
         Some(false) => {
             let reflectance = match fields.get("reflectance") {
-                Some(node) => fields.reflectance(node, "reflectance")?,
+                Some(node) => fields.reflectance(node, "reflectance").unwrap_or_default(),
                 None => Rgb::splat(0.6),
             };
             Material::Diffuse { reflectance }
@@ -487,7 +499,7 @@ fn material(fields: Fields<'_, '_>) -> Option<Material> {
             let ambient = fields.color("ambient").unwrap_or(diffuse);
             let specular = fields.color("specular").unwrap_or(Rgb::BLACK);
             let shininess = match fields.get("shininess") {
-                Some(node) => fields.positive(node, "shininess").unwrap_or(1.0),
+                Some(node) => fields.not_negative(node, "shininess").unwrap_or(1.0),
                 None => 32.0,
             };
             let models = [("blinn-phong", PhongModel::BlinnPhong), ("phong", PhongModel::Phong)];
@@ -507,10 +519,15 @@ fn light(reader: &Reader<'_>, fields: Fields<'_, '_>) -> Option<LightDesc> {
     let light = if is_directional {
         let direction = fields.require_vector("direction");
         let irradiance = fields.require_color("irradiance");
-        if direction.is_some_and(|d| d.length() < 1e-150) {
-            reader.mistake(fields.span(), "the `direction` of a light must not be zero");
-            return None;
-        }
+        let direction = direction.filter(|d| {
+            let is_zero = d.length() < 1e-30;
+            if is_zero {
+                let node = fields.get("direction");
+                let span = node.map_or(fields.span(), |node| node.span);
+                reader.mistake(span, "the `direction` of a light must not be zero");
+            }
+            !is_zero
+        });
         direction
             .zip(irradiance)
             .map(|(direction, irradiance)| LightDesc::Directional { direction, irradiance })

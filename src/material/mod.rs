@@ -72,7 +72,7 @@ impl Material {
                     PhongModel::BlinnPhong => n.dot((wi + wo).normalize_or_zero()),
                     PhongModel::Phong => (n * (2.0 * cos_theta) - wi).dot(wo),
                 };
-                let highlight = cos_alpha.max(0.0).powf(phong.shininess);
+                let highlight = cos_alpha.clamp(0.0, 1.0).powf(phong.shininess);
                 (diffuse + phong.specular * highlight) * FRAC_1_PI
             }
         }

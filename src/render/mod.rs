@@ -9,13 +9,18 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::accel::{Accel, LANES, RayBlock, RayQuery};
-use crate::film::{BlockAccumulator, Film, FilterTable, PixelRect};
+use crate::film::{BLOCK_LANES, BlockAccumulator, Film, FilterTable, PixelRect};
 use crate::integrator::{Direct, Flat, Integrator, RayCounts};
-use crate::sampler::{Dimensions, Sampler};
+use crate::sampler::{Dimensions, REPLICATES, Sampler};
 use crate::scene::{IntegratorKind, Scene};
 
 /// Pixels of a tile's side: a multiple of the block's 4.
 const TILE: u32 = 32;
+
+/// Samples of a block between two looks at whether to stop.
+const STOP_EVERY: u32 = 256;
+
+const _: () = assert!(LANES == BLOCK_LANES, "a block of rays is a block of pixels");
 
 /// Non-finite samples that are told one by one; further ones are only counted.
 const NON_FINITE_TOLD: usize = 8;
@@ -65,7 +70,7 @@ pub struct Rendered {
 pub struct NonFinite {
     /// How many.
     pub count: u64,
-    /// Pixel and sample number of the first few, in the picture's order.
+    /// Pixel and sample number of a few of them, in the picture's order.
     pub first: Vec<([u32; 2], u32)>,
 }
 
@@ -107,7 +112,8 @@ fn run<Q: RayQuery, I: Integrator>(
         whole,
     };
 
-    tiles.par_iter().for_each_init(BlockAccumulator::default, |sums, tile| {
+    let accumulator = || BlockAccumulator::new(REPLICATES);
+    tiles.par_iter().for_each_init(accumulator, |sums, tile| {
         let mut output = TileOutput::default();
         let pixels = renderer.render(tile, &window, sums, &mut output, observer);
         {
@@ -187,17 +193,25 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
                 if block.area() == 0 {
                     continue;
                 }
-                if observer.stop() {
+                if !self.render_block([x, y], &block, sums, output, observer) {
                     return pixels;
                 }
-                self.render_block([x, y], sums, output);
                 pixels += block.area() as u64;
             }
         }
         pixels
     }
 
-    fn render_block(&self, origin: [u32; 2], sums: &mut BlockAccumulator, output: &mut TileOutput) {
+    /// Renders the block at `origin`, of which `wanted` is inside the window. False where the observer
+    /// ended it; the block is then discarded.
+    fn render_block(
+        &self,
+        origin: [u32; 2],
+        wanted: &PixelRect,
+        sums: &mut BlockAccumulator,
+        output: &mut TileOutput,
+        observer: &dyn Observer,
+    ) -> bool {
         let pixel = |lane: usize| [origin[0] + lane as u32 % 4, origin[1] + lane as u32 / 4];
         let inside = (0..LANES)
             .filter(|&lane| {
@@ -208,6 +222,9 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
 
         sums.restart(0);
         for sample in 0..self.samples {
+            if sample % STOP_EVERY == 0 && observer.stop() {
+                return false;
+            }
             let mut rays = RayBlock::empty();
             let mut weights = [1.0; LANES];
             for lane in (0..LANES).filter(|lane| inside >> lane & 1 == 1) {
@@ -231,12 +248,17 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             }
             let dropped = sums.add(sample, inside, &radiance);
             for lane in (0..LANES).filter(|lane| dropped >> lane & 1 == 1) {
+                let [x, y] = pixel(lane);
+                if !wanted.contains(x, y) {
+                    continue;
+                }
                 output.non_finite.count += 1;
                 if output.non_finite.first.len() < NON_FINITE_TOLD {
-                    output.non_finite.first.push((pixel(lane), sample));
+                    output.non_finite.first.push(([x, y], sample));
                 }
             }
         }
         output.blocks.push(sums.finish(origin));
+        true
     }
 }

@@ -51,7 +51,7 @@ pub struct Scene {
 
 /// A name that stands for nothing.
 #[derive(Debug, thiserror::Error)]
-#[error("{at}: unknown {kind} `{name}`{}; accepted: {}", did_you_mean(.similar), list(.accepted))]
+#[error("{at}: unknown {kind} `{name}`{}; accepted: {}", did_you_mean(.similar), .accepted)]
 pub struct UnknownName {
     /// Where it is used.
     pub at: Location,
@@ -61,8 +61,8 @@ pub struct UnknownName {
     pub name: String,
     /// The defined name that it most resembles.
     pub similar: Option<String>,
-    /// All names defined.
-    pub accepted: Vec<String>,
+    /// Names that are defined: the first few, and how many more there are.
+    pub accepted: String,
 }
 
 /// Why a scene cannot be built.
@@ -94,6 +94,60 @@ pub enum SceneError {
         /// The object.
         at: Location,
     },
+    /// An object, or the scene, reaches beyond what f32 ray queries can hold.
+    #[error(
+        "{at}: {what} reaches {reach:.0e}; coordinates must lie within 1e12 of the middle of the scene"
+    )]
+    TooLarge {
+        /// The object; the scene as a whole where no object is to blame alone.
+        at: Location,
+        /// "this object", "the scene".
+        what: &'static str,
+        /// The largest coordinate.
+        reach: f64,
+    },
+    /// The scene, or a prototype, is smaller than what f32 ray queries can hold.
+    #[error(
+        "{at}: {what} is only {extent:.0e} across; below 1e-10 ray queries find nothing: scale it up"
+    )]
+    TooSmall {
+        /// The scene, or the prototype.
+        at: Location,
+        /// "the scene", "a prototype".
+        what: &'static str,
+        /// Its largest side.
+        extent: f64,
+    },
+    /// A copy's transform stretches or shrinks beyond f32.
+    #[error(
+        "{at}: transform {row} (counted from 0) of this object scales by {scale:.0e}; accepted: 1e-9 to 1e9"
+    )]
+    CopyScale {
+        /// The object.
+        at: Location,
+        /// Which of its transforms.
+        row: usize,
+        /// The factor.
+        scale: f64,
+    },
+    /// Prototypes that copy prototypes that copy prototypes …
+    #[error("{at}: prototypes are nested more than {limit} deep")]
+    NestedTooDeep {
+        /// Where the limit is passed.
+        at: Location,
+        /// The limit.
+        limit: usize,
+    },
+    /// More copies than can be held.
+    #[error("{at}: {count} copies in all; at most {limit} are possible")]
+    TooManyCopies {
+        /// The scene.
+        at: Location,
+        /// How many there would be.
+        count: u64,
+        /// How many there may be.
+        limit: u64,
+    },
     /// One of a list of copies has a bad transform.
     #[error("{at}: transform {row} (counted from 0) of this object is singular or not finite")]
     CopySingular {
@@ -104,7 +158,7 @@ pub enum SceneError {
     },
     /// A camera has no direction to look in.
     #[error(
-        "{at}: the camera has no direction: `eye` and `target` must differ, and `up` must not be parallel to the view; a `transform` must not be singular"
+        "{at}: the camera has no direction: `eye` and `target` must differ, and `up` must not be parallel to the view; a `transform` must not be singular or sheared"
     )]
     Camera {
         /// The camera.
@@ -158,7 +212,7 @@ impl NameIndex {
                 kind,
                 name: reference.name.clone(),
                 similar: similar.cloned(),
-                accepted: self.names.clone(),
+                accepted: list(&self.names),
             }))
         })
     }

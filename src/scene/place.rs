@@ -11,7 +11,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::build::{NameIndex, SceneError};
-use super::desc::{ObjectDesc, SceneDesc, ShapeDesc};
+use super::desc::{Location, ObjectDesc, SceneDesc, ShapeDesc};
 use crate::accel::{Geometry, Group, InstanceSet, World, rows_from_affine};
 use crate::geometry::{Sphere, TriangleMesh};
 use crate::math::Bounds;
@@ -49,7 +49,7 @@ impl GeometryMaterials {
 /// What a group is made of before it is moved and rounded.
 #[derive(Debug, Default)]
 struct Draft {
-    /// (mesh, material, group from mesh); `true` where this is the mesh's only use.
+    /// (mesh, material, group from mesh).
     meshes: Vec<(usize, u32, DAffine3)>,
     spheres: Vec<(Sphere, u32)>,
     /// Copies of other drafts, by index.
@@ -63,6 +63,21 @@ enum Shared {
     UnitSphere(u32),
     Prototype(usize),
 }
+
+/// Coordinates beyond this overflow in f32 ray queries, whose edge tests grow with the third power.
+const MAX_REACH: f64 = 1e12;
+
+/// A scene smaller than this vanishes in them.
+const MIN_EXTENT: f64 = 1e-10;
+
+/// Scales of copies that a query can invert in f32.
+const COPY_SCALES: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
+/// Prototypes within prototypes.
+const MAX_NESTING: usize = 64;
+
+/// Copies in all: some 300 bytes each.
+const MAX_COPIES: u64 = 200_000_000;
 
 struct Placer<'a> {
     materials: &'a NameIndex,
@@ -100,10 +115,10 @@ pub(super) fn place(
         shared: HashMap::new(),
         errors: Vec::new(),
     };
-    let root = placer.draft(std::mem::take(&mut desc.objects));
+    let root = placer.draft(std::mem::take(&mut desc.objects), 0);
     // Prototypes that nothing copies are checked all the same.
     for index in 0..placer.prototypes.len() {
-        placer.prototype(index);
+        placer.prototype(index, 1);
     }
     if !placer.errors.is_empty() {
         return Err(placer.errors);
@@ -116,6 +131,11 @@ pub(super) fn place(
         .map(|m| m.as_ref().map_or(Bounds::EMPTY, |m| m.bounds().translated(m.origin)))
         .collect();
 
+    let copied = count_copies(&root, &drafts);
+    if copied > MAX_COPIES {
+        let at = Location::default();
+        return Err(vec![SceneError::TooManyCopies { at, count: copied, limit: MAX_COPIES }]);
+    }
     // Nested copies become one level: (draft, world from draft) for every draft that is copied.
     let mut copies: Vec<Vec<DAffine3>> = vec![Vec::new(); drafts.len()];
     let mut pending: Vec<(usize, DAffine3)> = root.copies.clone();
@@ -132,6 +152,23 @@ pub(super) fn place(
         world_bounds = transforms.iter().fold(world_bounds, |w, m| w.union(b.transformed(m)));
     }
     let center = far_center(&world_bounds);
+    let mut errors = Vec::new();
+    let moved = world_bounds.translated(-center);
+    let reach = moved.min.abs().max(moved.max.abs()).max_element();
+    if !world_bounds.is_empty() && !(reach <= MAX_REACH) {
+        let (at, what) = (Location::default(), "the scene");
+        errors.push(SceneError::TooLarge { at, what, reach });
+    }
+    let small = |bounds: &Bounds, what: &'static str| {
+        let extent = bounds.size().max_element();
+        let is_small = extent > 0.0 && extent < MIN_EXTENT;
+        is_small.then(|| SceneError::TooSmall { at: Location::default(), what, extent })
+    };
+    errors.extend(small(&world_bounds, "the scene"));
+    errors.extend(bounds.iter().filter_map(|b| small(b, "a prototype")));
+    if !errors.is_empty() {
+        return Err(errors);
+    }
 
     let mut placed = Placed { center, ..Placed::default() };
     // A draft of nothing but copies is no group of its own.
@@ -166,7 +203,7 @@ pub(super) fn place(
 }
 
 impl Placer<'_> {
-    fn draft(&mut self, objects: Vec<ObjectDesc>) -> Draft {
+    fn draft(&mut self, objects: Vec<ObjectDesc>, depth: usize) -> Draft {
         let mut draft = Draft::default();
         for object in objects {
             let material = match &object.material {
@@ -195,7 +232,7 @@ impl Placer<'_> {
                         ..Draft::default()
                     };
                     let shared = self.share(Shared::Mesh(mesh, material), only);
-                    draft.copies.push((shared, m));
+                    self.copy(&mut draft, shared, m, &object);
                 }
                 ShapeDesc::Sphere { center, radius } => match uniform_scale(&m.matrix3) {
                     Some(scale) => {
@@ -213,7 +250,7 @@ impl Placer<'_> {
                             glam::DQuat::IDENTITY,
                             center,
                         );
-                        draft.copies.push((shared, m * place));
+                        self.copy(&mut draft, shared, m * place, &object);
                     }
                 },
                 ShapeDesc::Instances { ref prototype, ref transforms } => {
@@ -230,7 +267,12 @@ impl Placer<'_> {
                             break;
                         }
                     }
-                    match self.prototype(index) {
+                    if depth == MAX_NESTING {
+                        let at = prototype.at.clone();
+                        self.errors.push(SceneError::NestedTooDeep { at, limit: MAX_NESTING });
+                        continue;
+                    }
+                    match self.prototype(index, depth + 1) {
                         Some(shared) => {
                             draft.copies.extend(transforms.iter().map(|t| (shared, m * *t)))
                         }
@@ -245,6 +287,14 @@ impl Placer<'_> {
         draft
     }
 
+    /// Adds a copy that stands for one object.
+    fn copy(&mut self, draft: &mut Draft, shared: usize, m: DAffine3, object: &ObjectDesc) {
+        match check_row(&m, 0, object) {
+            Ok(()) => draft.copies.push((shared, m)),
+            Err(error) => self.errors.push(error),
+        }
+    }
+
     fn share(&mut self, key: Shared, make: impl FnOnce() -> Draft) -> usize {
         *self.shared.entry(key).or_insert_with(|| {
             self.drafts.push(make());
@@ -253,12 +303,12 @@ impl Placer<'_> {
     }
 
     /// The draft of a prototype, made on first use. None while it is being made: it contains itself.
-    fn prototype(&mut self, index: usize) -> Option<usize> {
+    fn prototype(&mut self, index: usize, depth: usize) -> Option<usize> {
         if let Some(&draft) = self.shared.get(&Shared::Prototype(index)) {
             return Some(draft);
         }
         let objects = self.prototypes[index].take()?;
-        let draft = self.draft(objects);
+        let draft = self.draft(objects, depth);
         self.drafts.push(draft);
         self.shared.insert(Shared::Prototype(index), self.drafts.len() - 1);
         Some(self.drafts.len() - 1)
@@ -352,10 +402,28 @@ fn check_transform(m: &DAffine3, object: &ObjectDesc) -> Result<(), SceneError> 
 }
 
 fn check_row(m: &DAffine3, row: usize, object: &ObjectDesc) -> Result<(), SceneError> {
-    if m.is_finite() && !is_singular(&m.matrix3) {
-        return Ok(());
+    let at = || object.at.clone();
+    if !m.is_finite() || is_singular(&m.matrix3) {
+        return Err(SceneError::CopySingular { at: at(), row });
     }
-    Err(SceneError::CopySingular { at: object.at.clone(), row })
+    let axes = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis].map(DVec3::length);
+    match axes.into_iter().find(|scale| !COPY_SCALES.contains(scale)) {
+        Some(scale) => Err(SceneError::CopyScale { at: at(), row, scale }),
+        None => Ok(()),
+    }
+}
+
+/// Copies of all drafts once nesting is resolved, however many that would be.
+fn count_copies(root: &Draft, drafts: &[Draft]) -> u64 {
+    // A draft is made after those that it copies, so their counts are known.
+    let mut below: Vec<u64> = Vec::with_capacity(drafts.len());
+    let count = |draft: &Draft, below: &[u64]| {
+        draft.copies.iter().fold(0u64, |n, (d, _)| n.saturating_add(1).saturating_add(below[*d]))
+    };
+    for draft in drafts {
+        below.push(count(draft, &below));
+    }
+    count(root, &below)
 }
 
 /// Whether a matrix flattens space, to within f32.
@@ -378,6 +446,9 @@ fn far_center(bounds: &Bounds) -> DVec3 {
         return DVec3::ZERO;
     }
     let unit = extent.max(reach * f64::from(f32::EPSILON)).log2().ceil().exp2();
+    if unit == 0.0 {
+        return DVec3::ZERO;
+    }
     (bounds.center() / unit).round() * unit
 }
 

@@ -1,6 +1,6 @@
 //! From a hit to the point of the surface that it means: position with its error, normals, sides.
 
-use glam::{DAffine3, Vec3};
+use glam::{DMat3, Vec3};
 
 use super::build::Scene;
 use crate::accel::{Geometry, Hit, Transform3x4, affine_from_rows};
@@ -27,7 +27,8 @@ pub struct SurfacePoint<'a> {
     pub material: &'a Material,
 }
 
-/// Position, error, outward geometric and shading normal (not of unit length) in one space.
+/// Position, error, outward geometric and shading normal (of unit length, or zero where there is none)
+/// in one space.
 struct Local {
     position: Vec3,
     error: f32,
@@ -52,10 +53,10 @@ impl Scene {
             Some(rows) => to_world(&local, rows),
         };
         // A triangle of no area has no normal: any will do, as long as it faces the viewer.
-        let outward = placed.geometric_normal.try_normalize().unwrap_or(-ray.direction);
+        let outward = or_else(placed.geometric_normal, -ray.direction);
         let is_front = outward.dot(ray.direction) <= 0.0;
         let side = if is_front { 1.0 } else { -1.0 };
-        let normal = placed.normal.try_normalize().unwrap_or(outward);
+        let normal = or_else(placed.normal, outward);
         // An interpolated normal may point to the other side of its triangle; the geometric one decides.
         let normal = if normal.dot(outward) < 0.0 { -normal } else { normal };
         SurfacePoint {
@@ -85,6 +86,12 @@ impl Scene {
     }
 }
 
+/// A unit normal, or another where it is zero.
+#[inline]
+fn or_else(normal: Vec3, other: Vec3) -> Vec3 {
+    if normal == Vec3::ZERO { other } else { normal }
+}
+
 /// The point with barycentric weights (1 − u − v, u, v).
 ///
 /// The bound on its position is γ(7)·Σ|bᵢ pᵢ| (pbrt 4ed §6.8.4). Added is what a query may see: it
@@ -99,12 +106,15 @@ fn on_triangle(mesh: &TriangleMesh, hit: &Hit) -> Local {
     let position = pa + pb + pc;
     let sum = (pa.abs() + pb.abs() + pc.abs()).max_element();
     let reach = (a - position).abs().max((b - position).abs()).max((c - position).abs());
-    let geometric_normal = (b - a).cross(c - a);
+    // In f64: the square of an f32 cross product overflows from edges of 4·10⁹ on, and vanishes below
+    // 2·10⁻¹¹.
+    let [da, db, dc] = [a, b, c].map(Vec3::as_dvec3);
+    let geometric_normal = (db - da).cross(dc - da).normalize_or_zero().as_vec3();
     let normal = match &mesh.normals {
         None => geometric_normal,
         Some(normals) => {
             let [i, j, k] = mesh.triangles[hit.primitive as usize].map(|i| normals[i as usize]);
-            Vec3::from(i) * w + Vec3::from(j) * u + Vec3::from(k) * v
+            (Vec3::from(i) * w + Vec3::from(j) * u + Vec3::from(k) * v).normalize_or_zero()
         }
     };
     Local {
@@ -138,7 +148,8 @@ fn on_sphere(sphere: &Sphere, ray: &Ray, t: f32, transform: Option<&Transform3x4
 /// From a copy's space to the world's.
 ///
 /// The bound follows pbrt 4ed §6.8.5. Added is what a query may see: it takes the ray to the copy's
-/// space by an inverse that is itself rounded, an error in proportion to the translation.
+/// space by an inverse that is itself rounded, which shows in the world as |M|·|M⁻¹| times the
+/// coordinates: little for a rotation, much for a squeeze.
 fn to_world(local: &Local, rows: &Transform3x4) -> Local {
     let row =
         |i: usize| (Vec3::new(rows[4 * i], rows[4 * i + 1], rows[4 * i + 2]), rows[4 * i + 3]);
@@ -147,29 +158,25 @@ fn to_world(local: &Local, rows: &Transform3x4) -> Local {
     let position = Vec3::from(m.map(|(r, t)| r.dot(p) + t));
     let magnitude = Vec3::from(m.map(|(r, t)| r.abs().dot(p.abs()) + t.abs()));
     let stretch = Vec3::from(m.map(|(r, _)| r.abs().element_sum()));
-    let error = stretch * local.error * (1.0 + gamma(3)) + magnitude * gamma(16);
-    let normal_matrix = NormalMatrix::new(&affine_from_rows(rows));
+
+    let affine = affine_from_rows(rows);
+    let (x, y, z) = (affine.matrix3.x_axis, affine.matrix3.y_axis, affine.matrix3.z_axis);
+    let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+    let determinant = x.dot(y.cross(z));
+    let (forward, inverse) =
+        (affine.matrix3.abs(), cofactors.transpose().abs() * (1.0 / determinant.abs()));
+    let seen = forward * (inverse * (magnitude + position.abs()).as_dvec3());
+
+    let error =
+        stretch * local.error * (1.0 + gamma(3)) + magnitude * gamma(4) + seen.as_vec3() * gamma(8);
+    // The inverse transpose up to a positive factor: cofactors, with their sign turned where the
+    // transform mirrors, so that outward stays outward.
+    let normal_matrix = cofactors * determinant.signum();
+    let to_world = |n: Vec3| (normal_matrix * n.as_dvec3()).normalize_or_zero().as_vec3();
     Local {
         position,
         error: error.max_element(),
-        geometric_normal: normal_matrix.apply(local.geometric_normal),
-        normal: normal_matrix.apply(local.normal),
-    }
-}
-
-/// The inverse transpose, up to a positive factor: the matrix of cofactors, with its sign turned where
-/// the transform mirrors, so that outward stays outward.
-struct NormalMatrix(glam::DMat3);
-
-impl NormalMatrix {
-    fn new(m: &DAffine3) -> Self {
-        let (x, y, z) = (m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis);
-        let cofactors = glam::DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
-        let sign = x.dot(y.cross(z)).signum();
-        Self(cofactors * sign)
-    }
-
-    fn apply(&self, n: Vec3) -> Vec3 {
-        (self.0 * n.as_dvec3()).normalize_or_zero().as_vec3()
+        geometric_normal: to_world(local.geometric_normal),
+        normal: to_world(local.normal),
     }
 }
