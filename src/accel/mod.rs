@@ -65,7 +65,7 @@ pub struct Hit {
 pub enum Precision {
     /// Embree's defaults: some rays are lost at edges and far from the origin.
     Fast,
-    /// Watertight at edges, accurate far from the origin.
+    /// Watertight at edges (not quite at vertices), accurate far from the origin.
     #[default]
     Robust,
 }
@@ -86,10 +86,11 @@ impl Precision {
 /// How much work goes into building the hierarchy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BuildQuality {
-    /// As suits the scene.
+    /// As suits the scene; medium at present.
     #[default]
     Auto,
-    /// Fast to build.
+    /// Fast to build. With several threads it may come out different from run to run, and so may which
+    /// of two coincident surfaces is hit.
     Low,
     /// Between the two.
     Medium,

@@ -24,7 +24,8 @@ Start here:
   alhazen render scene.toml --size 640x360 --samples 4 --set camera.fov=30
   alhazen inspect scene.toml                  what it holds, what it requires, what it costs
 
-Exit codes: 0 done, 1 the render failed, 2 bad input or usage, 130 interrupted (a valid picture is on disk).
+Exit codes: 0 done, 1 the render failed, 2 bad input or usage, 130 interrupted (once rendering had begun, a valid
+picture is on disk).
 The scene format is described in docs/scene.md."
 )]
 pub(super) struct Args {
@@ -66,11 +67,12 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "NAME", value_parser = by_name(&IntegratorKind::ALL, IntegratorKind::name))]
     pub(super) integrator: Option<IntegratorKind>,
 
-    /// How exact ray queries are: `fast` loses some rays at edges and far from the origin, `robust` does not
+    /// How exact ray queries are: `fast` loses some rays at edges and far from the origin, `robust` only a
+    /// few that meet a vertex exactly
     #[arg(long, value_name = "NAME", value_parser = by_name(&Precision::ALL, Precision::name))]
     pub(super) precision: Option<Precision>,
 
-    /// Work put into the hierarchy
+    /// Work put into the hierarchy: `low` is fast to build, `high` (with --precision fast) fast to trace
     #[arg(long, value_name = "NAME", value_parser = by_name(&BuildQuality::ALL, BuildQuality::name))]
     pub(super) build_quality: Option<BuildQuality>,
 

@@ -1,8 +1,7 @@
 //! Colour: linear Rec.709 triples, luminance, and the sRGB transfer curve at the edges (what a
 //! person types as `#rrggbb`, what a PNG stores). Nothing in between is ever non-linear.
 
-use std::iter::Sum;
-use std::ops::{Add, AddAssign, Div, Mul, MulAssign};
+use std::ops::{Add, AddAssign, Mul, MulAssign};
 
 /// A linear Rec.709 triple: a reflectance, a radiance, an irradiance, as the name beside it says.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -93,20 +92,6 @@ impl MulAssign<f32> for Rgb {
     #[inline]
     fn mul_assign(&mut self, k: f32) {
         *self = *self * k;
-    }
-}
-
-impl Div<f32> for Rgb {
-    type Output = Self;
-    #[inline]
-    fn div(self, k: f32) -> Self {
-        Self::new(self.r / k, self.g / k, self.b / k)
-    }
-}
-
-impl Sum for Rgb {
-    fn sum<I: Iterator<Item = Self>>(iter: I) -> Self {
-        iter.fold(Self::BLACK, Add::add)
     }
 }
 

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::error::ReadError;
 use super::{obj, ply, stl};
 use crate::geometry::{Positions, TriangleMesh};
+use crate::math::Bounds;
 
 /// A mesh as read, with what the user should know about it.
 #[derive(Clone, Debug)]
@@ -52,9 +53,6 @@ const MAX_COUNT: u64 = u32::MAX as u64 - 1;
 /// Largest coordinate that is taken for one; beyond it, squared distances overflow an f32.
 const MAX_COORDINATE: f64 = 1e18;
 
-/// Coordinates this many times farther out than the mesh is large are moved to a nearer origin.
-const FAR: f64 = 64.0;
-
 /// Checks a number of `what` ("vertices", "triangles") against what ids can name.
 pub(super) fn check_count(path: &Path, n: u64, what: &str) -> Result<(), ReadError> {
     if n > MAX_COUNT {
@@ -71,50 +69,11 @@ pub(super) fn zeroed_positions(n: usize) -> Vec<f32> {
     xyz
 }
 
-/// Where three coordinates are all usable.
-fn is_usable(p: DVec3) -> bool {
-    p.abs().cmple(DVec3::splat(MAX_COORDINATE)).all()
-}
-
-/// An axis-aligned box around points; empty at first.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    min: DVec3,
-    max: DVec3,
-}
-
-impl Bounds {
-    /// Around nothing.
-    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
-
-    /// Grows to hold `p`, unless `p` is not finite or absurdly far.
-    #[inline]
-    pub fn add(&mut self, p: DVec3) {
-        if is_usable(p) {
-            self.min = self.min.min(p);
-            self.max = self.max.max(p);
-        }
-    }
-
-    /// The box around both.
-    pub fn union(self, other: Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
-    }
-
-    /// Where to put the origin of coordinates that were given with more digits than an f32 has:
-    /// zero, or near the centre if they are far away compared with their extent. It is a multiple
-    /// of a power of two, so that subtracting it loses nothing.
-    pub fn origin(self) -> DVec3 {
-        let extent = (self.max - self.min).max_element();
-        let farthest = self.min.abs().max(self.max.abs()).max_element();
-        // The first comparison is false for the empty box.
-        if !(extent >= 0.0 && farthest > FAR * extent) {
-            return DVec3::ZERO;
-        }
-        let centre = 0.5 * (self.min + self.max);
-        let step = extent.log2().floor().exp2();
-        let rounded = (centre / step).round() * step;
-        if rounded.is_finite() { rounded } else { centre }
+/// `bounds` grown to hold `p`, unless `p` is not finite or absurdly far.
+#[inline]
+pub(super) fn include(bounds: &mut Bounds, p: DVec3) {
+    if p.abs().cmple(DVec3::splat(MAX_COORDINATE)).all() {
+        *bounds = bounds.including(p);
     }
 }
 
@@ -131,11 +90,11 @@ pub(super) fn place(xyz: &[f64]) -> (DVec3, Vec<f32>) {
         .par_chunks(PART)
         .map(|part| {
             let mut bounds = Bounds::EMPTY;
-            part.as_chunks::<3>().0.iter().for_each(|&p| bounds.add(p.into()));
+            part.as_chunks::<3>().0.iter().for_each(|&p| include(&mut bounds, p.into()));
             bounds
         })
         .reduce(|| Bounds::EMPTY, Bounds::union);
-    let origin = bounds.origin();
+    let origin = bounds.far_center();
     let mut relative = zeroed_positions(xyz.len() / 3);
     relative.par_chunks_mut(PART).zip(xyz.par_chunks(PART)).for_each(|(to, from)| {
         for (to, from) in to.as_chunks_mut::<3>().0.iter_mut().zip(from.as_chunks::<3>().0) {
@@ -333,14 +292,14 @@ mod tests {
         for (i, (&exact, &relative)) in far.iter().zip(&xyz).enumerate() {
             assert!((origin[i % 3] + f64::from(relative) - exact).abs() < 1e-7);
         }
-        // Few digits: a multiple of the power of two below the extent (here 0.998, so 1/2).
-        assert_eq!((origin * 2.0).fract(), DVec3::ZERO);
+        // Few digits: a multiple of the power of two above the extent (here 0.998, so 1).
+        assert_eq!(origin.fract(), DVec3::ZERO);
     }
 
     #[test]
-    fn a_single_far_point_is_its_own_origin() {
+    fn a_single_far_point_keeps_its_place() {
         let (origin, xyz) = place(&[1e6, -2e6, 0.1]);
-        assert_eq!((origin, xyz), (DVec3::new(1e6, -2e6, 0.1), vec![0.0; 3]));
+        assert_eq!((origin, xyz), (DVec3::new(1e6, -2e6, 0.0), vec![0.0, 0.0, 0.1]));
     }
 
     #[test]

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use glam::{DAffine3, DMat4, DQuat, DVec3};
+use glam::{DAffine3, DMat4, DVec3};
 
 use super::document::{Document, Node, Value};
 use super::fields::{Fields, Reader};
 use super::mesh::read_mesh;
 use super::mistakes::Mistakes;
-use super::transforms::read_transforms;
+use super::transforms::{affine, read_transforms, transform};
 use crate::accel::{BuildQuality, Precision};
 use crate::camera::Projection;
 use crate::color::Rgb;
@@ -544,93 +544,4 @@ fn light(reader: &Reader<'_>, fields: Fields<'_, '_>) -> Option<LightDesc> {
     };
     fields.finish();
     light
-}
-
-/// A list of steps, applied in the order written.
-fn transform(reader: &Reader<'_>, node: &Node) -> Option<DAffine3> {
-    let Value::Array(steps) = &node.value else {
-        reader.expected(
-            node,
-            "transform",
-            "a list of steps: { scale = … }, { rotate = … }, { translate = … }, { matrix = … }",
-        );
-        return None;
-    };
-    let mut total = DAffine3::IDENTITY;
-    for step in steps {
-        total = transform_step(reader, step)? * total;
-    }
-    Some(total)
-}
-
-fn transform_step(reader: &Reader<'_>, step: &Node) -> Option<DAffine3> {
-    // The step is looked at twice: for its fields, and for what else is in it.
-    let Value::Table(entries) = &step.value else {
-        reader.expected(step, "transform", "a list of tables such as { scale = 2.0 }");
-        return None;
-    };
-    let [entry] = entries.as_slice() else {
-        reader.mistake(
-            step.span,
-            "a step of a transform has one field: scale, rotate, translate or matrix",
-        );
-        return None;
-    };
-    let node = &entry.node;
-    match entry.key.as_str() {
-        "scale" => {
-            let scale = match &node.value {
-                Value::Array(_) => DVec3::from(reader.numbers::<3>(node, "scale")?),
-                _ => DVec3::splat(reader.number(node, "scale")?),
-            };
-            Some(DAffine3::from_scale(scale))
-        }
-        "translate" => {
-            Some(DAffine3::from_translation(reader.numbers::<3>(node, "translate")?.into()))
-        }
-        "rotate" => {
-            let Value::Table(parts) = &node.value else {
-                reader.expected(node, "rotate", "{ axis = [x, y, z], degrees = angle }");
-                return None;
-            };
-            let find = |name: &str| parts.iter().find(|e| e.key == name).map(|e| &e.node);
-            let (Some(axis), Some(degrees), 2) = (find("axis"), find("degrees"), parts.len())
-            else {
-                reader
-                    .mistake(node.span, "`rotate` has the fields `axis` and `degrees`, no others");
-                return None;
-            };
-            let Some(direction) = DVec3::from(reader.numbers::<3>(axis, "axis")?).try_normalize()
-            else {
-                reader.mistake(axis.span, "the `axis` of a rotation must not be zero");
-                return None;
-            };
-            let angle = reader.number(degrees, "degrees")?.to_radians();
-            Some(DAffine3::from_quat(DQuat::from_axis_angle(direction, angle)))
-        }
-        "matrix" => {
-            let m = reader.numbers::<16>(node, "matrix")?;
-            if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-                reader.mistake(node.span, "the last row of a `matrix` must be 0, 0, 0, 1");
-                return None;
-            }
-            let mut rows = [0.0; 12];
-            rows.copy_from_slice(&m[..12]);
-            Some(affine(&rows))
-        }
-        other => {
-            let message = format!(
-                "unknown field `{other}` in a step of a transform; accepted: scale, rotate, translate, matrix"
-            );
-            reader.mistake(entry.key_span, message);
-            None
-        }
-    }
-}
-
-/// Three rows of four numbers as a transform.
-pub(super) fn affine(m: &[f64; 12]) -> DAffine3 {
-    DAffine3::from_cols_array(&[
-        m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10], m[3], m[7], m[11],
-    ])
 }

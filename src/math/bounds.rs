@@ -17,12 +17,18 @@ impl Bounds {
 
     /// The smallest box around `points`.
     pub fn of(points: impl IntoIterator<Item = DVec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+        points.into_iter().fold(Self::EMPTY, Self::including)
     }
 
     /// The smallest box around both.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// The smallest box around it and a point.
+    #[inline]
+    pub fn including(self, p: DVec3) -> Self {
+        Self { min: self.min.min(p), max: self.max.max(p) }
     }
 
     /// Whether it holds nothing.
@@ -60,6 +66,25 @@ impl Bounds {
     /// The box moved by `by`.
     pub fn translated(&self, by: DVec3) -> Self {
         Self { min: self.min + by, max: self.max + by }
+    }
+
+    /// What to subtract from coordinates in the box before they are rounded to f32: zero, unless they
+    /// are far from the origin compared with their extent and would lose digits; then about the
+    /// centre, rounded so coarsely that subtracting it from an f32 is exact.
+    pub fn far_center(&self) -> DVec3 {
+        /// Nearer than this many extents f32 loses four bits at most, and nothing is moved.
+        const FAR: f64 = 16.0;
+        if self.is_empty() {
+            return DVec3::ZERO;
+        }
+        let extent = self.size().max_element();
+        let reach = self.min.abs().max(self.max.abs()).max_element();
+        if reach <= FAR * extent {
+            return DVec3::ZERO;
+        }
+        let unit = extent.max(reach * f64::from(f32::EPSILON)).log2().ceil().exp2();
+        // Denormal coordinates are as good as zero.
+        if unit == 0.0 { DVec3::ZERO } else { (self.center() / unit).round() * unit }
     }
 
     /// Where the line `origin + t·direction` is inside: (t at entry, t at exit), if anywhere.
@@ -106,5 +131,19 @@ mod tests {
         let expected = Bounds { min: DVec3::new(-1.0, 0.0, 0.0), max: DVec3::new(0.0, 2.0, 6.0) };
         assert_eq!(b.transformed(&m), expected);
         assert!(Bounds::EMPTY.transformed(&m).is_empty());
+    }
+
+    #[test]
+    fn near_things_stay_where_they_are() {
+        let near = Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(15.0) };
+        assert_eq!(near.far_center(), DVec3::ZERO);
+        let far = near.translated(DVec3::new(1e7, 0.0, -3e6));
+        let center = far.far_center();
+        assert!((far.center() - center).abs().max_element() <= 8.0);
+        // Subtraction is exact for any f32 in the box.
+        for x in [1e7f32 - 1.0, 1e7 + 3.0, 1e7 + 15.0] {
+            let moved = f64::from(x) - center.x;
+            assert_eq!(f64::from(moved as f32), moved);
+        }
     }
 }

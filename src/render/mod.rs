@@ -75,7 +75,8 @@ pub struct NonFinite {
 }
 
 /// Renders a scene on the threads of the current rayon pool. The picture depends on scene, job and
-/// instruction set alone, not on the number of threads or their order.
+/// instruction set alone, not on the number of threads or their order (but for surfaces that coincide
+/// in a hierarchy built at low quality).
 pub fn render(scene: &Scene, job: &RenderJob, observer: &dyn Observer) -> Rendered {
     // Static dispatch from here on: four loops are compiled, one is run.
     match (&scene.accel, scene.settings.integrator) {

@@ -126,7 +126,7 @@ pub struct RenderSettings {
     pub integrator: IntegratorKind,
     /// Samples a pixel, ≥ 1.
     pub samples: u32,
-    /// Bounces: 0 is the camera ray and its direct light.
+    /// Bounces: 0 is the camera ray and its direct light. `flat` and `direct` have none.
     pub max_depth: u32,
     /// How exact ray queries are.
     pub precision: Precision,

@@ -151,7 +151,7 @@ pub(super) fn place(
     for (b, transforms) in bounds.iter().zip(&copies) {
         world_bounds = transforms.iter().fold(world_bounds, |w, m| w.union(b.transformed(m)));
     }
-    let center = far_center(&world_bounds);
+    let center = world_bounds.far_center();
     let mut errors = Vec::new();
     let moved = world_bounds.translated(-center);
     let reach = moved.min.abs().max(moved.max.abs()).max_element();
@@ -185,7 +185,7 @@ pub(super) fn place(
         if !used(draft, transforms) {
             continue;
         }
-        let origin = far_center(bounds);
+        let origin = bounds.far_center();
         let (group, materials) = group(draft, origin);
         let rows = transforms.iter().map(|m| {
             let centred =
@@ -433,42 +433,9 @@ fn is_singular(m: &DMat3) -> bool {
     !(m.determinant().abs() > 1e-9 * volume)
 }
 
-/// What to subtract from coordinates within `bounds`: zero unless they are far from the origin
-/// compared with their extent, else about the centre, rounded so coarsely that subtracting it from
-/// an f32 is exact.
-fn far_center(bounds: &Bounds) -> DVec3 {
-    if bounds.is_empty() {
-        return DVec3::ZERO;
-    }
-    let extent = bounds.size().max_element();
-    let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
-    if reach <= 16.0 * extent {
-        return DVec3::ZERO;
-    }
-    let unit = extent.max(reach * f64::from(f32::EPSILON)).log2().ceil().exp2();
-    if unit == 0.0 {
-        return DVec3::ZERO;
-    }
-    (bounds.center() / unit).round() * unit
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn near_things_stay_where_they_are() {
-        let near = Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(15.0) };
-        assert_eq!(far_center(&near), DVec3::ZERO);
-        let far = near.translated(DVec3::new(1e7, 0.0, -3e6));
-        let center = far_center(&far);
-        assert!((far.center() - center).abs().max_element() <= 8.0);
-        // Subtraction is exact for any f32 in the box.
-        for x in [1e7f32 - 1.0, 1e7 + 3.0, 1e7 + 15.0] {
-            let moved = f64::from(x) - center.x;
-            assert_eq!(f64::from(moved as f32), moved);
-        }
-    }
 
     #[test]
     fn even_scales_are_recognised() {

@@ -7,8 +7,9 @@ use super::header::{Element, Scalar};
 use super::values::{decode, decode_f32, decode_integer, decode_u32};
 use super::{VertexLayout, Vertices};
 use crate::io::error::ReadError;
-use crate::io::mesh::{Bounds, to_relative, zeroed_positions};
+use crate::io::mesh::{include, to_relative, zeroed_positions};
 use crate::io::source::{CHUNK, Source};
+use crate::math::Bounds;
 
 /// The offset and type of a number in a record.
 type Slot = (usize, Scalar);
@@ -43,12 +44,13 @@ pub(super) fn vertices<const BIG: bool>(
                 let bytes = source.read_into(buf, len, offset(chunk))?;
                 let mut bounds = Bounds::EMPTY;
                 for record in bytes.chunks_exact(stride) {
-                    bounds.add(xyz_slots.map(|(o, ty)| decode::<BIG>(ty, &record[o..])).into());
+                    let xyz = xyz_slots.map(|(o, ty)| decode::<BIG>(ty, &record[o..]));
+                    include(&mut bounds, xyz.into());
                 }
                 Ok::<_, ReadError>(bounds)
             })
             .try_reduce(|| Bounds::EMPTY, |a, b| Ok(a.union(b)))?
-            .origin();
+            .far_center();
     }
 
     let mut xyz = zeroed_positions(n);
