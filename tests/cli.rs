@@ -90,6 +90,28 @@ fn render_writes_every_output_and_a_table() {
 }
 
 #[test]
+fn png_is_srgb_after_exposure() {
+    let folder = folder();
+    // The corner shows the background, (0.2, 0.3, 0.4).
+    let corner = |arguments: &[&str]| {
+        let mut all = vec!["render", "scene.toml", "-o", "e.png"];
+        all.extend(arguments);
+        run(folder.path(), &all);
+        let file = std::fs::File::open(folder.path().join("e.png")).unwrap();
+        let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap();
+        assert!(reader.info().srgb.is_some(), "the file says that it is sRGB");
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut bytes).unwrap();
+        [bytes[0], bytes[1], bytes[2]]
+    };
+    // IEC 61966-2-1: 255 (1.055 x^(1/2.4) − 0.055).
+    assert_eq!(corner(&[]), [124, 149, 170]);
+    assert_eq!(corner(&["--exposure", "1"]), [170, 203, 231]);
+    assert_eq!(corner(&["--exposure", "-1"]), [89, 108, 124]);
+    assert_eq!(corner(&["--exposure", "9"]), [255, 255, 255]);
+}
+
+#[test]
 fn without_an_output_the_scenes_name_is_used() {
     let folder = folder();
     run(folder.path(), &["render", "scene.toml", "--quiet", "--size", "8x8"]);
