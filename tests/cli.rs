@@ -369,7 +369,9 @@ fn an_interrupt_leaves_a_valid_picture() {
         .unwrap();
     std::thread::sleep(Duration::from_millis(700));
     let start = Instant::now();
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    // The shell's own `kill`: a bare system has no other.
+    let kill = format!("kill -INT {}", child.id());
+    let killed = Command::new("sh").args(["-c", &kill]).status().unwrap();
     assert!(killed.success());
     let output = child.wait_with_output().unwrap();
     assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
