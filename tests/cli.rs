@@ -256,6 +256,7 @@ fn bad_input_is_exit_code_2_and_nothing_is_written() {
     let folder = folder();
     std::fs::write(folder.path().join("bad.toml"), "[camera]\nfow = 3\n").unwrap();
     std::fs::write(folder.path().join("old.exr"), "old").unwrap();
+    std::fs::write(folder.path().join("empty.ply"), "").unwrap();
     let cases: &[(&[&str], &str)] = &[
         (&["render", "missing.toml"], "alhazen: missing.toml: cannot read: No such file"),
         (
@@ -270,6 +271,7 @@ fn bad_input_is_exit_code_2_and_nothing_is_written() {
             &["render", "scene.toml", "-o", "nowhere/x.exr"],
             "nowhere/x.exr: cannot create a file in its folder",
         ),
+        (&["render", "empty.ply"], "alhazen: empty.ply: the file is empty"),
         (
             &["render", "scene.txt"],
             "scene.txt: unknown kind of scene; accepted: .toml, .ply, .obj, .stl",
@@ -298,7 +300,7 @@ fn bad_input_is_exit_code_2_and_nothing_is_written() {
         assert!(stdout(&output).is_empty());
     }
     assert_eq!(std::fs::read(folder.path().join("old.exr")).unwrap(), b"old");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
 }
 
 #[test]

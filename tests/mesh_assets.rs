@@ -287,7 +287,6 @@ fn broken_files_are_refused_or_warned_about() {
     let sound = [
         "trimesh_nancolor.obj",
         "deg_faces.obj",
-        "degenerate_mesh.obj",
         "eof_test.obj",
         "missing_material_file.obj",
         "no_material.obj",

@@ -22,6 +22,7 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 pub(super) fn catch_interrupts() {
     let caught = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            crate::io::remove_unfinished();
             std::process::exit(130);
         }
     });

@@ -69,6 +69,16 @@ pub(super) fn zeroed_positions(n: usize) -> Vec<f32> {
     xyz
 }
 
+/// Whether a triangle's corners are not on a line.
+fn has_area(xyz: &[f32], triangle: &[u32; 3]) -> bool {
+    let corner = |i: u32| {
+        let at = 3 * i as usize;
+        DVec3::new(xyz[at].into(), xyz[at + 1].into(), xyz[at + 2].into())
+    };
+    let [a, b, c] = triangle.map(corner);
+    (b - a).cross(c - a) != DVec3::ZERO
+}
+
 /// `bounds` grown to hold `p`, unless `p` is not finite or absurdly far.
 #[inline]
 pub(super) fn include(bounds: &mut Bounds, p: DVec3) {
@@ -192,8 +202,11 @@ impl Draft {
             zero_unless_finite(uvs);
         }
         if self.triangles.is_empty() {
-            self.warnings
-                .push(format!("no triangles ({})", counted(self.xyz.len() as u64 / 3, "point")));
+            let points = counted(self.xyz.len() as u64 / 3, "point");
+            self.warnings.push(format!("no triangles ({points})"));
+        // The first triangle that has an area ends the search.
+        } else if !self.triangles.iter().any(|t| has_area(&self.xyz, t)) {
+            self.warnings.push("no triangle has an area: there is nothing to see".to_owned());
         }
         // Growth by doubling may have left much unused; the mesh lives as long as the scene.
         if self.triangles.capacity() > self.triangles.len() + self.triangles.len() / 8 {
@@ -318,7 +331,10 @@ mod tests {
         assert!(mesh.positions.as_flat().iter().all(|v| v.is_finite()));
         assert_eq!(
             warnings,
-            ["2 triangles with a NaN or infinite coordinate were dropped; the first is triangle 1"]
+            [
+                "2 triangles with a NaN or infinite coordinate were dropped; the first is triangle 1",
+                "no triangle has an area: there is nothing to see"
+            ]
         );
         assert_eq!(mesh.normals.unwrap()[0], [0.0; 3]);
         assert_eq!(mesh.uvs.unwrap()[0], [0.0; 2]);

@@ -15,6 +15,10 @@ pub struct Mistake {
 
 impl fmt::Display for Mistake {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // What is wrong with a bare mesh begins with its name, which is also the place.
+        if self.at.position.is_none() && self.message.starts_with(&*self.at.source) {
+            return f.write_str(&self.message);
+        }
         write!(f, "{}: {}", self.at, self.message)
     }
 }

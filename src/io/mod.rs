@@ -30,6 +30,6 @@ pub use error::{ReadError, WriteError};
 pub use exr::{ExrCompression, ExrOptions, PixelType, write_exr};
 pub use mesh::{MeshFile, read_mesh};
 pub use mistakes::{Mistake, Mistakes};
-pub use output::{Attribute, AttributeValue, check_writable, write_text};
+pub use output::{Attribute, AttributeValue, check_writable, remove_unfinished, write_text};
 pub use png::write_png;
 pub use scene_file::{LoadError, LoadOptions, LoadedScene, load_scene};

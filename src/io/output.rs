@@ -4,7 +4,8 @@
 use std::fs::Permissions;
 use std::io::{BufWriter, Write};
 use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use tempfile::{Builder, NamedTempFile};
 
@@ -61,6 +62,33 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     temporary(&path.canonicalize().unwrap_or_else(|_| path.to_owned())).map(drop)
 }
 
+/// Files that are being written, under their temporary names.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes what is being written: for a program that is about to end without unwinding.
+pub fn remove_unfinished() {
+    for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+        // Nothing can be done about one that stays.
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+/// Keeps a file in the list above while it lives.
+struct Unfinished(PathBuf);
+
+impl Unfinished {
+    fn new(path: &Path) -> Self {
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+        Self(path.to_owned())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).retain(|p| *p != self.0);
+    }
+}
+
 /// Writes `path` through `write`, whole or not at all.
 pub(super) fn write_whole<W>(path: &Path, write: W) -> Result<(), WriteError>
 where
@@ -69,6 +97,7 @@ where
     // Through a link to the file that it names, which stays as open or as closed as it was.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let file = temporary(&target)?;
+    let _unfinished = Unfinished::new(file.path());
     if let Ok(old) = target.metadata() {
         let failed = |e| WriteError::io(path, "keep the permissions of", e);
         file.as_file().set_permissions(old.permissions()).map_err(failed)?;
