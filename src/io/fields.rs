@@ -22,7 +22,7 @@ pub(super) struct Fields<'d, 'r> {
     reader: &'r Reader<'d>,
     entries: &'d [Entry],
     span: Span,
-    /// What the table is, for messages: "[camera]", "a sphere".
+    /// What the table is, for messages: `[camera]`, "a sphere".
     what: RefCell<String>,
     known: RefCell<Vec<&'static str>>,
 }
