@@ -369,6 +369,18 @@ fn an_interrupt_leaves_a_valid_picture() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
+    // Until it catches the signal (number 2), which it does before it reads the scene.
+    let status = format!("/proc/{}/status", child.id());
+    let catches = || {
+        let status = std::fs::read_to_string(&status).unwrap_or_default();
+        let mask = status.lines().find_map(|l| l.strip_prefix("SigCgt:")).map(str::trim);
+        mask.and_then(|m| u64::from_str_radix(m, 16).ok()).is_some_and(|m| m & 2 != 0)
+    };
+    let start = Instant::now();
+    while !catches() && start.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // And until it renders: reading and building two objects is a matter of milliseconds.
     std::thread::sleep(Duration::from_millis(700));
     let start = Instant::now();
     // The shell's own `kill`: a bare system has no other.
