@@ -61,7 +61,7 @@ fn scenes_beyond_f32_are_refused() {
         sphere("1.0", &format!("transform = [{{ scale = [{scale}, {scale}, 0.1] }}]"))
     };
     for (text, message) in [
-        (sphere("1e13", ""), "coordinates must lie within 1e12"),
+        (sphere("1e13", ""), "coordinates must lie within 1e12 of it"),
         (sphere("1e-11", ""), "below 1e-10 ray queries find nothing"),
         (sphere("1e200", ""), "`radius` must be a finite number (within 1e30)"),
         (scaled("1e10"), "accepted: 1e-9 to 1e9"),
@@ -106,7 +106,10 @@ fn nests_of_prototypes_are_bounded() {
     }
     tree += "[[objects]]\ninstance = \"p12\"\n";
     let error = load(&tree, AccelKind::Brute).map(|_| ()).unwrap_err();
-    assert!(error.contains("copies in all; at most 200000000 are possible"), "{error}");
+    assert!(
+        error.contains("copies of prototypes in all; at most 200000000 are possible"),
+        "{error}"
+    );
 }
 
 /// A look for the line of every object counted the lines from the start of the file.

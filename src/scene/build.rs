@@ -94,25 +94,19 @@ pub enum SceneError {
         /// The object.
         at: Location,
     },
-    /// An object, or the scene, reaches beyond what f32 ray queries can hold.
+    /// The scene reaches beyond what f32 ray queries can hold.
     #[error(
-        "{at}: {what} reaches {reach:.0e}; coordinates must lie within 1e12 of the middle of the scene"
+        "the scene reaches {reach:.0e} from its middle; coordinates must lie within 1e12 of it"
     )]
     TooLarge {
-        /// The object; the scene as a whole where no object is to blame alone.
-        at: Location,
-        /// "this object", "the scene".
-        what: &'static str,
-        /// The largest coordinate.
+        /// The largest coordinate, from the middle.
         reach: f64,
     },
     /// The scene, or a prototype, is smaller than what f32 ray queries can hold.
     #[error(
-        "{at}: {what} is only {extent:.0e} across; below 1e-10 ray queries find nothing: scale it up"
+        "{what} is only {extent:.0e} across; below 1e-10 ray queries find nothing: scale it up"
     )]
     TooSmall {
-        /// The scene, or the prototype.
-        at: Location,
         /// "the scene", "a prototype".
         what: &'static str,
         /// Its largest side.
@@ -139,10 +133,8 @@ pub enum SceneError {
         limit: usize,
     },
     /// More copies than can be held.
-    #[error("{at}: {count} copies in all; at most {limit} are possible")]
+    #[error("the scene has {count} copies of prototypes in all; at most {limit} are possible")]
     TooManyCopies {
-        /// The scene.
-        at: Location,
         /// How many there would be.
         count: u64,
         /// How many there may be.

@@ -11,7 +11,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::build::{NameIndex, SceneError};
-use super::desc::{Location, ObjectDesc, SceneDesc, ShapeDesc};
+use super::desc::{ObjectDesc, SceneDesc, ShapeDesc};
 use crate::accel::{Geometry, Group, InstanceSet, World, rows_from_affine};
 use crate::geometry::{Sphere, TriangleMesh};
 use crate::math::Bounds;
@@ -131,41 +131,14 @@ pub(super) fn place(
         .map(|m| m.as_ref().map_or(Bounds::EMPTY, |m| m.bounds().translated(m.origin)))
         .collect();
 
-    let copied = count_copies(&root, &drafts);
-    if copied > MAX_COPIES {
-        let at = Location::default();
-        return Err(vec![SceneError::TooManyCopies { at, count: copied, limit: MAX_COPIES }]);
-    }
-    // Nested copies become one level: (draft, world from draft) for every draft that is copied.
-    let mut copies: Vec<Vec<DAffine3>> = vec![Vec::new(); drafts.len()];
-    let mut pending: Vec<(usize, DAffine3)> = root.copies.clone();
-    while let Some((draft, transform)) = pending.pop() {
-        copies[draft].push(transform);
-        pending.extend(drafts[draft].copies.iter().map(|(d, m)| (*d, transform * *m)));
-    }
-    // The stack reversed their order.
-    copies.iter_mut().for_each(|c| c.reverse());
-
+    let copies = flatten(&root, &drafts).map_err(|e| vec![e])?;
     let bounds: Vec<Bounds> = drafts.iter().map(|d| d.bounds(&mesh_bounds)).collect();
     let mut world_bounds = root.bounds(&mesh_bounds);
     for (b, transforms) in bounds.iter().zip(&copies) {
         world_bounds = transforms.iter().fold(world_bounds, |w, m| w.union(b.transformed(m)));
     }
     let center = world_bounds.far_center();
-    let mut errors = Vec::new();
-    let moved = world_bounds.translated(-center);
-    let reach = moved.min.abs().max(moved.max.abs()).max_element();
-    if !world_bounds.is_empty() && !(reach <= MAX_REACH) {
-        let (at, what) = (Location::default(), "the scene");
-        errors.push(SceneError::TooLarge { at, what, reach });
-    }
-    let small = |bounds: &Bounds, what: &'static str| {
-        let extent = bounds.size().max_element();
-        let is_small = extent > 0.0 && extent < MIN_EXTENT;
-        is_small.then(|| SceneError::TooSmall { at: Location::default(), what, extent })
-    };
-    errors.extend(small(&world_bounds, "the scene"));
-    errors.extend(bounds.iter().filter_map(|b| small(b, "a prototype")));
+    let errors = out_of_range(&world_bounds.translated(-center), &bounds);
     if !errors.is_empty() {
         return Err(errors);
     }
@@ -411,6 +384,40 @@ fn check_row(m: &DAffine3, row: usize, object: &ObjectDesc) -> Result<(), SceneE
         Some(scale) => Err(SceneError::CopyScale { at: at(), row, scale }),
         None => Ok(()),
     }
+}
+
+/// World from draft for every copy of every draft, nested ones included: one level instead of many.
+fn flatten(root: &Draft, drafts: &[Draft]) -> Result<Vec<Vec<DAffine3>>, SceneError> {
+    let count = count_copies(root, drafts);
+    if count > MAX_COPIES {
+        return Err(SceneError::TooManyCopies { count, limit: MAX_COPIES });
+    }
+    let mut copies: Vec<Vec<DAffine3>> = vec![Vec::new(); drafts.len()];
+    let mut pending: Vec<(usize, DAffine3)> = root.copies.clone();
+    while let Some((draft, transform)) = pending.pop() {
+        copies[draft].push(transform);
+        pending.extend(drafts[draft].copies.iter().map(|(d, m)| (*d, transform * *m)));
+    }
+    // The stack reversed their order.
+    copies.iter_mut().for_each(|c| c.reverse());
+    Ok(copies)
+}
+
+/// What f32 ray queries cannot hold, of the recentred world and of its prototypes.
+fn out_of_range(world: &Bounds, prototypes: &[Bounds]) -> Vec<SceneError> {
+    let mut errors = Vec::new();
+    let reach = world.min.abs().max(world.max.abs()).max_element();
+    if !world.is_empty() && !(reach <= MAX_REACH) {
+        errors.push(SceneError::TooLarge { reach });
+    }
+    let small = |bounds: &Bounds, what: &'static str| {
+        let extent = bounds.size().max_element();
+        let is_small = extent > 0.0 && extent < MIN_EXTENT;
+        is_small.then_some(SceneError::TooSmall { what, extent })
+    };
+    errors.extend(small(world, "the scene"));
+    errors.extend(prototypes.iter().filter_map(|b| small(b, "a prototype")));
+    errors
 }
 
 /// Copies of all drafts once nesting is resolved, however many that would be.
