@@ -12,8 +12,7 @@ use common::{assets, files, stderr, verify};
 
 const MESHES: [&str; 3] = ["ply", "obj", "stl"];
 
-/// Runs the program with a time limit and, by the kernel, an address space of 2 GiB beyond what it
-/// maps to start with.
+/// Runs the program with a time limit and, by the kernel, an address space of 8 GB.
 fn limited(arguments: &[&str], seconds: u64) -> Output {
     let script = "ulimit -v 8000000; exec \"$0\" \"$@\"";
     let mut child = Command::new("sh")
@@ -89,7 +88,7 @@ fn every_mesh_gives_a_framed_lit_picture() {
         if !output.status.success() {
             return Some(format!("{:?}: {text}", output.status));
         }
-        // The size changes nothing of what is in the corner: the background.
+        // The corner shows the background, whatever the size.
         let (mean, covered) = look_at(&png);
         if text.contains("no triangle") {
             return (covered > 0.0).then(|| "a picture of nothing shows something".to_owned());

@@ -93,7 +93,7 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     pub(super) memory_limit: Option<u64>,
 
-    /// Print nothing but errors
+    /// No progress, warnings or closing table: only errors (and what `inspect` is asked for)
     #[arg(long, short)]
     pub(super) quiet: bool,
 }

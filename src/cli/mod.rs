@@ -1,4 +1,4 @@
-//! The command line: flags as typed ([`args`](self)), then what they mean together, progress,
+//! The command line: flags as typed (`args.rs`), then what they mean together (`job.rs`), progress,
 //! reports, exit codes. The only room that prints.
 //!
 //! Exit codes: 0 done, 1 the render failed, 2 bad input or usage, 130 interrupted with a valid picture
