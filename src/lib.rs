@@ -23,6 +23,7 @@
 //! | room | what it owns |
 //! |---|---|
 //! | [`cli`] | flags as typed, then what they mean together; progress, reports, exit codes |
+//! | [`measure`] | how far a picture is from a reference: error metrics and FLIP |
 //! | [`render`] · [`io`] | tiles, threads and stopping · files: scenes and meshes in, pictures out |
 //! | [`integrator`] | one file per algorithm: rays in, radiance out |
 //! | [`scene`] | what was written, and the immutable, query-ready scene made of it |
@@ -46,6 +47,7 @@ pub mod io;
 pub mod light;
 pub mod material;
 pub mod math;
+pub mod measure;
 pub mod render;
 pub mod sampler;
 pub mod scene;

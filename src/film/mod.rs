@@ -3,9 +3,11 @@
 
 mod accumulate;
 mod filter;
+mod picture;
 
 pub use accumulate::{BLOCK_LANES, BlockAccumulator, BlockPixels};
 pub use filter::{Filter, FilterSample, FilterTable};
+pub use picture::Picture;
 
 use crate::color::Rgb;
 

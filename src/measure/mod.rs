@@ -1,0 +1,239 @@
+//! How far a picture is from a reference: error metrics over pixels, and FLIP (`flip.rs`). Sums are in
+//! f64. It knows pictures, not files, and not how they were made.
+
+mod flip;
+
+use rayon::prelude::*;
+
+pub use flip::{Exposures, PIXELS_PER_DEGREE, flip, hdr_flip};
+
+use crate::color::{Rgb, linear_from_srgb};
+use crate::film::Picture;
+
+/// What [`compare`] finds. Means run over pixels and channels; every number is NaN where no pixel is
+/// finite in both pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Pixels that are NaN or infinite in one of the pictures at least. They are left out of all the
+    /// numbers below, and count as black in both where FLIP looks at the surroundings of others.
+    pub non_finite: u64,
+    /// Mean of (a − b)².
+    pub mse: f64,
+    /// Mean of |a − b|.
+    pub mae: f64,
+    /// Mean of (a − b)² / (b² + 0.01), where b is the reference.
+    pub rel_mse: f64,
+    /// 10 log₁₀(1 / mean squared error) in decibels, of both pictures clipped to [0, 1]; infinite where
+    /// they are then equal.
+    pub psnr: f64,
+    /// The largest |a − b|.
+    pub largest: f64,
+    /// The pixel that it is at, right of and below the first.
+    pub largest_at: [u32; 2],
+    /// Mean of [`flip`], on a display that clips to [0, 1].
+    pub flip: f64,
+    /// Mean of [`hdr_flip`], over all brightnesses.
+    pub hdr_flip: f64,
+    /// The exposures of the latter.
+    pub exposures: Exposures,
+    /// [`flip`] of each pixel, row by row; NaN where one of the pictures is not finite.
+    pub flip_map: Vec<f32>,
+}
+
+/// Two pictures do not show the same pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Unequal {
+    /// One has more pixels, or others in a row.
+    #[error("{}x{} and {}x{} pixels", .0[0], .0[1], .1[0], .1[1])]
+    Size([u32; 2], [u32; 2]),
+    /// They are different parts of a larger picture.
+    #[error("parts of a whole that begin at {},{} and at {},{}", .0[0], .0[1], .1[0], .1[1])]
+    Origin([i32; 2], [i32; 2]),
+}
+
+/// Whether two pictures show the same pixels, so that they can be compared.
+///
+/// # Errors
+/// [`Unequal`] where they do not. A picture that does not say where it lies may lie anywhere.
+pub fn check_same_pixels(a: &Picture, b: &Picture) -> Result<(), Unequal> {
+    if a.extent != b.extent {
+        return Err(Unequal::Size(a.extent, b.extent));
+    }
+    match (a.origin, b.origin) {
+        (Some(a), Some(b)) if a != b => Err(Unequal::Origin(a, b)),
+        _ => Ok(()),
+    }
+}
+
+/// Sums over some rows.
+#[derive(Clone, Copy)]
+struct Sums {
+    pixels: u64,
+    square: f64,
+    absolute: f64,
+    relative: f64,
+    clipped: f64,
+    /// The largest difference and the index of its pixel.
+    largest: (f64, usize),
+}
+
+impl Sums {
+    const NONE: Self = Self {
+        pixels: 0,
+        square: 0.0,
+        absolute: 0.0,
+        relative: 0.0,
+        clipped: 0.0,
+        largest: (0.0, 0),
+    };
+
+    fn add(&mut self, index: usize, a: Rgb, b: Rgb) {
+        if !(a.is_finite() && b.is_finite()) {
+            return;
+        }
+        self.pixels += 1;
+        for (a, b) in a.to_array().into_iter().zip(b.to_array()) {
+            let (a, b) = (f64::from(a), f64::from(b));
+            let d = a - b;
+            self.square += d * d;
+            self.absolute += d.abs();
+            self.relative += d * d / (b * b + 0.01);
+            self.clipped += (a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0)).powi(2);
+            if d.abs() > self.largest.0 {
+                self.largest = (d.abs(), index);
+            }
+        }
+    }
+
+    fn join(self, other: Self) -> Self {
+        Self {
+            pixels: self.pixels + other.pixels,
+            square: self.square + other.square,
+            absolute: self.absolute + other.absolute,
+            relative: self.relative + other.relative,
+            clipped: self.clipped + other.clipped,
+            largest: if other.largest.0 > self.largest.0 { other.largest } else { self.largest },
+        }
+    }
+}
+
+/// Compares the picture `a` with the reference `b`; `pixels_per_degree` is for FLIP, as
+/// [`PIXELS_PER_DEGREE`]. The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`Unequal`] where they do not show the same pixels.
+pub fn compare(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Comparison, Unequal> {
+    check_same_pixels(a, b)?;
+    let size = a.extent;
+    let width = size[0].max(1) as usize;
+    let rows: Vec<Sums> = a
+        .pixels
+        .par_chunks(width)
+        .zip(b.pixels.par_chunks(width))
+        .enumerate()
+        .map(|(y, (a, b))| {
+            let mut sums = Sums::NONE;
+            for (x, (&a, &b)) in a.iter().zip(b).enumerate() {
+                sums.add(y * width + x, a, b);
+            }
+            sums
+        })
+        .collect();
+    // One after the other, so that rounding is the same on any number of threads.
+    let sums = rows.into_iter().fold(Sums::NONE, Sums::join);
+    let total = a.pixels.len().min(b.pixels.len()) as u64;
+    let mean = |sum: f64| sum / (3 * sums.pixels) as f64;
+    let at = sums.largest.1;
+
+    let sound = |i: usize| a.pixels[i].is_finite() && b.pixels[i].is_finite();
+    let all_sound = sums.pixels == total;
+    let blackened = |pixels: &[Rgb]| -> Vec<Rgb> {
+        let value = |(i, &c): (usize, &Rgb)| if sound(i) { c } else { Rgb::BLACK };
+        pixels.iter().enumerate().map(value).collect()
+    };
+    let copies = (!all_sound).then(|| [blackened(&a.pixels), blackened(&b.pixels)]);
+    let [test, reference] = match &copies {
+        Some([a, b]) => [a, b],
+        None => [&a.pixels, &b.pixels],
+    };
+    let map_mean = |map: &[f32]| {
+        let values = map.iter().enumerate().filter(|&(i, _)| all_sound || sound(i));
+        values.map(|(_, &x)| f64::from(x)).sum::<f64>() / sums.pixels as f64
+    };
+    let mut flip_map = flip(test, reference, size, pixels_per_degree);
+    let flip_mean = map_mean(&flip_map);
+    if !all_sound {
+        flip_map
+            .iter_mut()
+            .enumerate()
+            .filter(|(i, _)| !sound(*i))
+            .for_each(|(_, x)| *x = f32::NAN);
+    }
+    let (hdr_map, exposures) = hdr_flip(test, reference, size, pixels_per_degree);
+    Ok(Comparison {
+        size,
+        non_finite: total - sums.pixels,
+        mse: mean(sums.square),
+        mae: mean(sums.absolute),
+        rel_mse: mean(sums.relative),
+        psnr: -10.0 * mean(sums.clipped).log10(),
+        largest: if sums.pixels == 0 { f64::NAN } else { sums.largest.0 },
+        largest_at: [(at % width) as u32, (at / width) as u32],
+        flip: flip_mean,
+        hdr_flip: map_mean(&hdr_map),
+        exposures,
+        flip_map,
+    })
+}
+
+/// |a − b| of each pixel and channel; NaN and infinite values stay visible.
+///
+/// # Errors
+/// [`Unequal`] where they do not show the same pixels.
+pub fn absolute_difference(a: &Picture, b: &Picture) -> Result<Picture, Unequal> {
+    check_same_pixels(a, b)?;
+    let difference =
+        |(a, b): (&Rgb, &Rgb)| Rgb::new((a.r - b.r).abs(), (a.g - b.g).abs(), (a.b - b.b).abs());
+    Ok(Picture { pixels: a.pixels.iter().zip(&b.pixels).map(difference).collect(), ..*b })
+}
+
+/// A value from 0 (black) to 1 (light yellow) as a linear colour; NaN is cyan, which the map lacks.
+///
+/// The colour map is *magma* by van der Walt and Smith (CC0): each sixteenth of its colours, linear
+/// between them, at most 0.012 off in sRGB.
+pub fn magma(value: f32) -> Rgb {
+    if value.is_nan() {
+        return Rgb::new(0.0, 1.0, 1.0);
+    }
+    let x = value.clamp(0.0, 1.0) * (MAGMA.len() - 1) as f32;
+    let i = (x as usize).min(MAGMA.len() - 2);
+    let (low, high, t) = (MAGMA[i], MAGMA[i + 1], x - i as f32);
+    [0, 1, 2].map(|c| linear_from_srgb(low[c] + t * (high[c] - low[c]))).into()
+}
+
+/// sRGB values at 0, 15/255, 30/255 … 1.
+const MAGMA: [[f32; 3]; 18] = [
+    [0.001, 0.000, 0.014],
+    [0.036, 0.028, 0.125],
+    [0.103, 0.063, 0.258],
+    [0.191, 0.065, 0.396],
+    [0.291, 0.065, 0.475],
+    [0.384, 0.098, 0.501],
+    [0.476, 0.135, 0.508],
+    [0.569, 0.167, 0.504],
+    [0.665, 0.198, 0.489],
+    [0.761, 0.231, 0.460],
+    [0.852, 0.276, 0.419],
+    [0.926, 0.347, 0.375],
+    [0.970, 0.447, 0.360],
+    [0.989, 0.558, 0.392],
+    [0.997, 0.668, 0.456],
+    [0.997, 0.777, 0.541],
+    [0.992, 0.884, 0.640],
+    [0.987, 0.991, 0.750],
+];
+
+#[cfg(test)]
+mod tests;
