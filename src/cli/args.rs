@@ -23,9 +23,10 @@ Start here:
   alhazen render scene.toml -o out.exr -o out.png
   alhazen render scene.toml --size 640x360 --samples 4 --set camera.fov=30
   alhazen inspect scene.toml                  what it holds, what it requires, what it costs
+  alhazen compare out.exr reference.exr       how far a picture is from a reference
 
-Exit codes: 0 done, 1 the render failed, 2 bad input or usage, 130 interrupted (once rendering had begun, a valid
-picture is on disk).
+Exit codes: 0 done, 1 the render failed or a comparison exceeded a limit, 2 bad input or usage, 130 interrupted
+(once rendering had begun, a valid picture is on disk).
 The scene format is described in docs/scene.md."
 )]
 pub(super) struct Args {
@@ -39,6 +40,8 @@ pub(super) enum Command {
     Render(RenderArgs),
     /// Say what a scene holds, what it requires of the renderer, and what it costs to build
     Inspect(InspectArgs),
+    /// Say how far a picture is from a reference (EXR or PNG): MSE, relMSE, PSNR, FLIP
+    Compare(CompareArgs),
 }
 
 /// What chooses and changes a scene.
@@ -138,6 +141,59 @@ pub(super) struct RenderArgs {
 pub(super) struct InspectArgs {
     #[command(flatten)]
     pub(super) scene: SceneArgs,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Values are linear: those of PNG files are decoded from sRGB. Means run over pixels and channels; relmse divides
+each squared difference by the square of the reference plus 0.01. FLIP is how different the pictures look, from 0
+to 1, at 67 pixels per degree: `flip` on a display that clips to [0, 1], `hdr-flip` as the largest over exposures
+that suit the reference. Pixels that are NaN or infinite are left out of all metrics; with any limit they exceed it.")]
+pub(super) struct CompareArgs {
+    /// The picture, .exr or .png
+    pub(super) picture: PathBuf,
+
+    /// What it should look like, .exr or .png, of the same size
+    pub(super) reference: PathBuf,
+
+    /// Largest mean squared error; more is exit code 1, as with the limits below
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub(super) max_mse: Option<f64>,
+
+    /// Largest mean absolute error
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub(super) max_mae: Option<f64>,
+
+    /// Largest relative mean squared error
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub(super) max_relmse: Option<f64>,
+
+    /// Largest mean FLIP
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub(super) max_flip: Option<f64>,
+
+    /// Largest mean HDR-FLIP
+    #[arg(long, value_name = "X", value_parser = parse_limit)]
+    pub(super) max_hdr_flip: Option<f64>,
+
+    /// Write a picture of the difference: .png shows FLIP from black to yellow (cyan: not finite), .exr
+    /// holds absolute differences
+    #[arg(long, value_name = "FILE")]
+    pub(super) difference: Option<PathBuf>,
+
+    /// Write the metrics as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) json: Option<PathBuf>,
+
+    /// No table: only errors and exceeded limits
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+/// A limit of a metric.
+fn parse_limit(text: &str) -> Result<f64, String> {
+    let limit = text.trim().parse().ok().filter(|x: &f64| x.is_finite() && *x >= 0.0);
+    limit.ok_or_else(|| "expected a number that is not negative".to_owned())
 }
 
 /// A parser of one of several names.

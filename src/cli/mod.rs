@@ -1,10 +1,11 @@
 //! The command line: flags as typed (`args.rs`), then what they mean together (`job.rs`), progress,
 //! reports, exit codes. The only room that prints.
 //!
-//! Exit codes: 0 done, 1 the render failed, 2 bad input or usage, 130 interrupted with a valid picture
-//! on disk.
+//! Exit codes: 0 done, 1 the render failed or a comparison exceeded a limit, 2 bad input or usage, 130
+//! interrupted with a valid picture on disk.
 
 mod args;
+mod compare;
 mod inspect;
 mod job;
 mod progress;
@@ -75,6 +76,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let result = match args.command {
         Command::Render(args) => job::render(&args, start),
         Command::Inspect(args) => inspect::inspect(&args),
+        Command::Compare(args) => compare::compare(&args),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
