@@ -24,7 +24,7 @@
 //! |---|---|
 //! | [`cli`] | flags as typed, then what they mean together; progress, reports, exit codes |
 //! | [`measure`] | how far a picture is from a reference: error metrics and FLIP |
-//! | [`render`] · [`io`] | tiles, threads and stopping · files: scenes and meshes in, pictures out |
+//! | [`render`] · [`io`] | tiles, threads and stopping · files: scenes, meshes and pictures in, pictures out |
 //! | [`integrator`] | one file per algorithm: rays in, radiance out |
 //! | [`scene`] | what was written, and the immutable, query-ready scene made of it |
 //! | [`accel`] · [`light`] · [`material`] · [`camera`] | the seam for ray queries · emission · scattering · viewing rays |

@@ -75,9 +75,15 @@ fn metrics_are_those_computed_by_hand() {
     assert_eq!(found["size"], serde_json::json!([8, 4]));
     assert_eq!((&found["non_finite"], &found["passed"]), (&0.into(), &true.into()));
     assert_eq!(found["picture"], "test.exr");
-    assert!(found["flip"].as_f64().unwrap() > 0.01 && found["hdr_flip"].as_f64().unwrap() > 0.01);
+    assert!(found["flip"].as_f64().unwrap() > 0.01 && found["hdr_flip"].is_null());
+    let hdr = json(folder.path(), &["test.exr", "ref.exr", "--hdr-flip"]);
+    assert!(hdr["hdr_flip"].as_f64().unwrap() > 0.01, "{hdr}");
+    assert!(hdr["hdr_flip_exposures"][1].is_f64(), "{hdr}");
 
     let (code, table, error) = compare(folder.path(), &["test.exr", "ref.exr"]);
+    assert!(!table.contains("hdr-flip"), "it takes long and was not asked for:\n{table}");
+    assert_eq!((code, error.as_str()), (0, ""));
+    let (code, table, error) = compare(folder.path(), &["test.exr", "ref.exr", "--hdr-flip"]);
     assert_eq!((code, error.as_str()), (0, ""));
     for line in [
         "  compared  test.exr with ref.exr, 8 x 4",

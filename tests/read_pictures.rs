@@ -224,8 +224,7 @@ fn exrs_that_claim_too_much_are_errors() {
     assert!(sized(1_000_000, 1_000_000).contains("accepted: at most 268435456 in all"));
     assert!(sized(9000, 9000).contains("is too short for a picture of 9000 x 9000 pixels"));
     assert!(sized(9, 400).contains("not a sound EXR file"));
-    assert!(sized(0, 40).contains("no pixels"));
-    for (width, height) in [(-5, 40), (i32::MIN + 1, 1), (i32::MAX, i32::MAX)] {
+    for (width, height) in [(0, 40), (-5, 40), (i32::MIN + 1, 1), (i32::MAX, i32::MAX)] {
         assert!(sized(width, height).contains(": "));
     }
     assert!(read(&good).is_ok());
@@ -234,28 +233,54 @@ fn exrs_that_claim_too_much_are_errors() {
     }
 }
 
+/// Tiled ones, one of several parts, and the cosines of DWA, which we do not write.
+fn foreign_exrs() -> Vec<Vec<u8>> {
+    let channels = || ["R", "G", "B"].map(|name| floats(name, 1.0)).to_vec();
+    let blocks = Blocks::Tiles(Vec2(2, 3));
+    let tiled = |compression| {
+        let line_order = LineOrder::Increasing;
+        with_channels(channels(), Encoding { compression, blocks, line_order })
+    };
+    let part = |name: &str| {
+        let channels = AnyChannels::sort(channels().into_iter().collect());
+        Layer::new((5, 3), LayerAttributes::named(name), Encoding::FAST_LOSSLESS, channels)
+    };
+    let attributes = ImageAttributes::new(IntegerBounds::from_dimensions((5, 3)));
+    let parts = bytes(&Image::from_layers(attributes, [part("a"), part("b")].as_slice()));
+    let scan_lines =
+        Encoding { compression: Compression::DWAA(None), ..Encoding::SMALL_FAST_LOSSLESS };
+    let half = |name: &str| {
+        let values = (0..15).map(|i| f16::from_f32(i as f32 / 15.0)).collect();
+        AnyChannel::new(name, FlatSamples::F16(values))
+    };
+    let dwa = with_channels(["R", "G", "B"].map(half).to_vec(), scan_lines);
+    vec![tiled(Compression::ZIP16), tiled(Compression::PIZ), parts, dwa]
+}
+
 /// Bytes changed at random: never a panic that ends the program, never much memory.
 #[test]
 fn broken_exrs_are_errors_or_pictures() {
-    let rounds = if verify() { 20_000 } else { 400 };
+    let rounds = if verify() { 5000 } else { 400 };
     let mut random = Random(1);
+    let mut files = foreign_exrs();
     for compression in ExrCompression::ALL {
-        for pixel_type in PixelType::ALL {
-            let good = small_exr(compression, pixel_type);
-            for _ in 0..rounds {
-                let mut file = good.clone();
-                for _ in 0..1 + random.below(4) {
-                    let at = 4 + random.below(file.len() - 4);
-                    file[at] = random.bits() as u8;
-                }
-                if random.below(4) == 0 {
-                    file.truncate(4 + random.below(good.len() - 4));
-                }
-                if let Ok(picture) = read(&file) {
-                    let [w, h] = picture.extent;
-                    assert_eq!(picture.pixels.len(), w as usize * h as usize);
-                    assert!(picture.pixels.len() < 1_000_000);
-                }
+        files.extend(PixelType::ALL.map(|kind| small_exr(compression, kind)));
+    }
+    for good in files {
+        assert!(read(&good).is_ok(), "before it is broken");
+        for _ in 0..rounds {
+            let mut file = good.clone();
+            for _ in 0..1 + random.below(4) {
+                let at = 4 + random.below(file.len() - 4);
+                file[at] = random.bits() as u8;
+            }
+            if random.below(4) == 0 {
+                file.truncate(4 + random.below(good.len() - 4));
+            }
+            if let Ok(picture) = read(&file) {
+                let [w, h] = picture.extent;
+                assert_eq!(picture.pixels.len(), w as usize * h as usize);
+                assert!(picture.pixels.len() < 1_000_000);
             }
         }
     }

@@ -172,9 +172,13 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "X", value_parser = parse_limit)]
     pub(super) max_flip: Option<f64>,
 
-    /// Largest mean HDR-FLIP
+    /// Largest mean HDR-FLIP; implies --hdr-flip
     #[arg(long, value_name = "X", value_parser = parse_limit)]
     pub(super) max_hdr_flip: Option<f64>,
+
+    /// Also HDR-FLIP, which looks at all exposures: several times as long as the rest
+    #[arg(long)]
+    pub(super) hdr_flip: bool,
 
     /// Write a picture of the difference: .png shows FLIP from black to yellow (cyan: not finite), .exr
     /// holds absolute differences

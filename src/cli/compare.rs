@@ -13,8 +13,7 @@ use crate::io::{
     write_text,
 };
 use crate::measure::{
-    Comparison, PIXELS_PER_DEGREE, absolute_difference, check_same_pixels, compare as measure,
-    magma,
+    CompareOptions, Comparison, absolute_difference, check_same_pixels, compare as measure, magma,
 };
 
 /// The fields of `--json`; their names are stable. A number that is infinite or undefined is null.
@@ -31,9 +30,10 @@ struct Report<'a> {
     max: f64,
     max_at: [u32; 2],
     flip: f64,
-    hdr_flip: f64,
+    /// Where it was asked for.
+    hdr_flip: Option<f64>,
     /// First and last, in stops.
-    hdr_flip_exposures: [f32; 2],
+    hdr_flip_exposures: Option<[f32; 2]>,
     non_finite: u64,
     /// Whether no limit was exceeded.
     passed: bool,
@@ -58,7 +58,11 @@ pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
         Failure::BadInput(format!("{a} and {b} do not show the same pixels: {e}"))
     };
     check_same_pixels(&a, &b).map_err(unequal)?;
-    let found = measure(&a, &b, PIXELS_PER_DEGREE).map_err(unequal)?;
+    let options = CompareOptions {
+        hdr_flip: args.hdr_flip || args.max_hdr_flip.is_some(),
+        ..CompareOptions::default()
+    };
+    let found = measure(&a, &b, &options).map_err(unequal)?;
     let exceeded = exceeded(args, &found);
 
     let failed = |e: WriteError| Failure::Failed(e.to_string());
@@ -128,7 +132,7 @@ fn exceeded(args: &CompareArgs, found: &Comparison) -> Vec<String> {
         ("mae", found.mae, args.max_mae),
         ("relmse", found.rel_mse, args.max_relmse),
         ("flip", found.flip, args.max_flip),
-        ("hdr-flip", found.hdr_flip, args.max_hdr_flip),
+        ("hdr-flip", found.hdr_flip.map_or(f64::NAN, |(mean, _)| mean), args.max_hdr_flip),
     ];
     let given = || limits.iter().filter_map(|&(name, value, limit)| Some((name, value, limit?)));
     let mut lines: Vec<String> = given()
@@ -180,9 +184,10 @@ fn print_table(args: &CompareArgs, found: &Comparison) {
     let at = if found.largest > 0.0 { format!(" at pixel {x},{y}") } else { String::new() };
     line("max", digits(found.largest) + &at);
     line("flip", digits(found.flip));
-    let e = found.exposures;
-    let exposures = format!("  exposures {:+.2} to {:+.2} EV", e.first, e.last);
-    line("hdr-flip", digits(found.hdr_flip) + &exposures);
+    if let Some((mean, e)) = found.hdr_flip {
+        let exposures = format!(", exposures {:+.2} to {:+.2} EV", e.first, e.last);
+        line("hdr-flip", digits(mean) + &exposures);
+    }
     line("non-finite", format!("{} pixels", grouped(found.non_finite)));
 }
 
@@ -203,8 +208,8 @@ fn write_json(
         max: found.largest,
         max_at: found.largest_at,
         flip: found.flip,
-        hdr_flip: found.hdr_flip,
-        hdr_flip_exposures: [found.exposures.first, found.exposures.last],
+        hdr_flip: found.hdr_flip.map(|(mean, _)| mean),
+        hdr_flip_exposures: found.hdr_flip.map(|(_, e)| [e.first, e.last]),
         non_finite: found.non_finite,
         passed,
     };

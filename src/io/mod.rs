@@ -1,7 +1,8 @@
-//! Files: scenes and meshes in, pictures out. One file per format.
+//! Files: scenes, meshes and pictures in, pictures out. One file per format and direction.
 //!
 //! It turns whatever a person wrote into a [`crate::scene::SceneDesc`], reading every file that a
-//! scene names, and writes a finished [`crate::film::Film`]. It never sees an integrator, and prints
+//! scene names, and writes a finished [`crate::film::Film`]; what it wrote it reads back as a
+//! [`crate::film::Picture`]. It never sees an integrator, and prints
 //! nothing: what should be told comes back as data.
 //!
 //! Numbers from files are suspects: nothing is allocated in proportion to a number that a file merely

@@ -34,12 +34,26 @@ pub struct Comparison {
     pub largest_at: [u32; 2],
     /// Mean of [`flip`], on a display that clips to [0, 1].
     pub flip: f64,
-    /// Mean of [`hdr_flip`], over all brightnesses.
-    pub hdr_flip: f64,
-    /// The exposures of the latter.
-    pub exposures: Exposures,
+    /// Mean of [`hdr_flip`] and its exposures, where it was asked for.
+    pub hdr_flip: Option<(f64, Exposures)>,
     /// [`flip`] of each pixel, row by row; NaN where one of the pictures is not finite.
     pub flip_map: Vec<f32>,
+}
+
+/// How to compare.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CompareOptions {
+    /// How large pixels look to FLIP's viewer, in pixels per degree.
+    pub pixels_per_degree: f32,
+    /// Whether to find HDR-FLIP too, which takes two to thirty times as long as FLIP: the longer the more
+    /// exposures the reference asks for, the most where half of it is black.
+    pub hdr_flip: bool,
+}
+
+impl Default for CompareOptions {
+    fn default() -> Self {
+        Self { pixels_per_degree: PIXELS_PER_DEGREE, hdr_flip: false }
+    }
 }
 
 /// Two pictures do not show the same pixels.
@@ -119,12 +133,11 @@ impl Sums {
     }
 }
 
-/// Compares the picture `a` with the reference `b`; `pixels_per_degree` is for FLIP, as
-/// [`PIXELS_PER_DEGREE`]. The result does not depend on the number of threads.
+/// Compares the picture `a` with the reference `b`. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`Unequal`] where they do not show the same pixels.
-pub fn compare(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Comparison, Unequal> {
+pub fn compare(a: &Picture, b: &Picture, options: &CompareOptions) -> Result<Comparison, Unequal> {
     check_same_pixels(a, b)?;
     let size = a.extent;
     let width = size[0].max(1) as usize;
@@ -162,7 +175,7 @@ pub fn compare(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Compa
         let values = map.iter().enumerate().filter(|&(i, _)| all_sound || sound(i));
         values.map(|(_, &x)| f64::from(x)).sum::<f64>() / sums.pixels as f64
     };
-    let mut flip_map = flip(test, reference, size, pixels_per_degree);
+    let mut flip_map = flip(test, reference, size, options.pixels_per_degree);
     let flip_mean = map_mean(&flip_map);
     if !all_sound {
         flip_map
@@ -171,7 +184,10 @@ pub fn compare(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Compa
             .filter(|(i, _)| !sound(*i))
             .for_each(|(_, x)| *x = f32::NAN);
     }
-    let (hdr_map, exposures) = hdr_flip(test, reference, size, pixels_per_degree);
+    let hdr_flip = options.hdr_flip.then(|| {
+        let (map, exposures) = hdr_flip(test, reference, size, options.pixels_per_degree);
+        (map_mean(&map), exposures)
+    });
     Ok(Comparison {
         size,
         non_finite: total - sums.pixels,
@@ -182,8 +198,7 @@ pub fn compare(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Compa
         largest: if sums.pixels == 0 { f64::NAN } else { sums.largest.0 },
         largest_at: [(at % width) as u32, (at / width) as u32],
         flip: flip_mean,
-        hdr_flip: map_mean(&hdr_map),
-        exposures,
+        hdr_flip,
         flip_map,
     })
 }

@@ -4,8 +4,10 @@ fn picture(size: [u32; 2], values: &[f32]) -> Picture {
     Picture::whole(size, values.iter().map(|&x| Rgb::splat(x)).collect())
 }
 
+const ALL: CompareOptions = CompareOptions { pixels_per_degree: PIXELS_PER_DEGREE, hdr_flip: true };
+
 fn compared(a: &Picture, b: &Picture) -> Comparison {
-    compare(a, b, PIXELS_PER_DEGREE).unwrap()
+    compare(a, b, &ALL).unwrap()
 }
 
 #[test]
@@ -30,8 +32,13 @@ fn metrics_as_by_hand() {
 fn equal_pictures_have_no_error() {
     let a = picture([3, 2], &[0.0, 0.1, 0.5, 1.0, 7.0, -1.0]);
     let c = compared(&a, &a);
-    assert_eq!([c.mse, c.mae, c.rel_mse, c.largest, c.flip, c.hdr_flip], [0.0; 6]);
+    assert_eq!([c.mse, c.mae, c.rel_mse, c.largest, c.flip, c.hdr_flip.unwrap().0], [0.0; 6]);
     assert_eq!(c.psnr, f64::INFINITY);
+    assert_eq!(
+        compare(&a, &a, &CompareOptions::default()).unwrap().hdr_flip,
+        None,
+        "not asked for"
+    );
 }
 
 #[test]
@@ -41,7 +48,7 @@ fn non_finite_pixels_are_counted_and_left_out() {
     let c = compared(&a, &b);
     assert_eq!(c.non_finite, 2);
     assert!((c.mse - 0.0625 / 2.0).abs() < 1e-12, "{c:?}");
-    assert!(c.flip.is_finite() && c.hdr_flip.is_finite(), "{c:?}");
+    assert!(c.flip.is_finite() && c.hdr_flip.unwrap().0.is_finite(), "{c:?}");
     assert_eq!(
         c.flip_map.iter().map(|x| x.is_nan()).collect::<Vec<_>>(),
         [false, true, true, false]
@@ -59,10 +66,10 @@ fn non_finite_pixels_are_counted_and_left_out() {
 fn only_the_same_pixels_are_compared() {
     let a = picture([2, 1], &[0.0; 2]);
     let b = picture([1, 2], &[0.0; 2]);
-    let error = compare(&a, &b, PIXELS_PER_DEGREE).unwrap_err();
+    let error = compare(&a, &b, &CompareOptions::default()).unwrap_err();
     assert_eq!(error.to_string(), "2x1 and 1x2 pixels");
     let moved = Picture { origin: Some([-3, 4]), ..a.clone() };
-    let error = compare(&a, &moved, PIXELS_PER_DEGREE).unwrap_err();
+    let error = compare(&a, &moved, &CompareOptions::default()).unwrap_err();
     assert_eq!(error.to_string(), "parts of a whole that begin at 0,0 and at -3,4");
     let unplaced = Picture { origin: None, ..a.clone() };
     assert!(check_same_pixels(&unplaced, &moved).is_ok());
