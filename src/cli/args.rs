@@ -145,10 +145,12 @@ pub(super) struct InspectArgs {
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Values are linear: those of PNG files are decoded from sRGB. Means run over pixels and channels; relmse divides
-each squared difference by the square of the reference plus 0.01. FLIP is how different the pictures look, from 0
-to 1, at 67 pixels per degree: `flip` on a display that clips to [0, 1], `hdr-flip` as the largest over exposures
-that suit the reference. Pixels that are NaN or infinite are left out of all metrics; with any limit they exceed it.")]
+Values are linear: those of PNG files are decoded from sRGB. Means run over pixels and channels; relmse \
+divides each squared difference by the square of the reference plus 0.01. Pixels that are NaN or infinite \
+are left out of all metrics; where any limit is given, they fail it.
+
+FLIP is how different the pictures look, from 0 to 1, at 67 pixels per degree: `flip` on a display that \
+clips to [0, 1], `hdr-flip` the largest over exposures that suit the reference.")]
 pub(super) struct CompareArgs {
     /// The picture, .exr or .png
     pub(super) picture: PathBuf,

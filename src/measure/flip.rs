@@ -41,7 +41,7 @@ const RGB_FROM_XYZ: [[f32; 3]; 3] = [
     [0.055_639_423, -0.204_011_2, 1.057_148_9],
 ];
 /// XYZ of white (D65).
-const WHITE: [f32; 3] = [0.950_428_545, 1.0, 1.088_900_371];
+const WHITE: [f32; 3] = [0.950_428_55, 1.0, 1.088_900_3];
 
 /// FLIP of each pixel of two pictures on a display: linear Rec.709, row by row, clipped to [0, 1].
 ///

@@ -32,11 +32,11 @@ pub struct Comparison {
     pub largest: f64,
     /// The pixel that it is at, right of and below the first.
     pub largest_at: [u32; 2],
-    /// Mean of [`flip`], on a display that clips to [0, 1].
+    /// Mean of [`flip()`], on a display that clips to [0, 1].
     pub flip: f64,
     /// Mean of [`hdr_flip`] and its exposures, where it was asked for.
     pub hdr_flip: Option<(f64, Exposures)>,
-    /// [`flip`] of each pixel, row by row; NaN where one of the pictures is not finite.
+    /// [`flip()`] of each pixel, row by row; NaN where one of the pictures is not finite.
     pub flip_map: Vec<f32>,
 }
 
