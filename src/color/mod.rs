@@ -1,7 +1,11 @@
 //! Colour: linear Rec.709 triples, luminance, and the sRGB transfer curve at the edges (what a
 //! person types as `#rrggbb`, what a PNG stores). Nothing in between is ever non-linear.
 
+mod spectrum;
+
 use std::ops::{Add, AddAssign, Mul, MulAssign};
+
+pub use spectrum::{MAX_WEIGHT, VISIBLE_MAX, VISIBLE_MIN, Wavelength, cie_1931, rec709_from_xyz};
 
 /// A linear Rec.709 triple: a reflectance, a radiance, an irradiance, as the name beside it says.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
