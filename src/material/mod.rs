@@ -1,5 +1,7 @@
 //! Materials: how a surface answers light. Each model with its formula; no lights, no rays.
 
+pub mod fresnel;
+
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
