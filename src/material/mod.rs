@@ -1,12 +1,15 @@
 //! Materials: how a surface answers light. Each model with its formula; no lights, no rays.
 
 pub mod fresnel;
+mod ior;
 
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
 use crate::color::Rgb;
+
+pub use ior::{GLASSES, Ior, LINE_C, LINE_D, LINE_E, LINE_F, LINE_G, glass};
 
 /// How a surface scatters light.
 #[derive(Debug, Clone, PartialEq)]
