@@ -2,6 +2,7 @@
 
 pub mod fresnel;
 mod ior;
+mod metals;
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -10,6 +11,7 @@ use glam::Vec3;
 use crate::color::Rgb;
 
 pub use ior::{GLASSES, Ior, LINE_C, LINE_D, LINE_E, LINE_F, LINE_G, glass};
+pub use metals::{METALS, Metal, metal};
 
 /// How a surface scatters light.
 #[derive(Debug, Clone, PartialEq)]
