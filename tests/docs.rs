@@ -285,7 +285,7 @@ fn the_reference_has_the_automatic_light() {
     let scene = Scene::build_quietly(desc, AccelKind::Brute).unwrap();
     let lights = scene.lights.iter().map(|light| match light {
         Light::Directional(light) => light.irradiance.r,
-        Light::Point(_) => panic!("the reference speaks of parallel light"),
+        _ => panic!("the reference speaks of parallel light"),
     });
     let text = section(" Automatic lighting");
     for number in lights.chain([scene.ambient.r, scene.background.r]) {

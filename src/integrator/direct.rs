@@ -31,7 +31,7 @@ impl Integrator for Direct {
             let mut unshadowed = [Rgb::BLACK; LANES];
             for (lane, point) in points.iter().enumerate() {
                 let Some(point) = point else { continue };
-                let Some(sample) = light.sample(point.position) else { continue };
+                let Some(sample) = light.sample(point.position, [0.5, 0.5]) else { continue };
                 // Light from behind the surface itself, whatever its shading normal says.
                 if sample.direction.dot(point.geometric_normal) <= 0.0 {
                     continue;

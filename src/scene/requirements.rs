@@ -28,6 +28,10 @@ pub struct Requirements {
     pub lecture_lights: u64,
     /// Directional lights.
     pub directional_lights: u64,
+    /// Spot lights.
+    pub spot_lights: u64,
+    /// Lights of some size.
+    pub area_lights: u64,
     /// Whether the scene has no light of its own and is lit from the camera's side.
     pub lit_automatically: bool,
     /// Whether shadow rays are traced.
@@ -74,6 +78,10 @@ impl Requirements {
                 Light::Point(light) if light.falloff == Falloff::None => r.lecture_lights += 1,
                 Light::Point(_) => r.point_lights += 1,
                 Light::Directional(_) => r.directional_lights += 1,
+                Light::Spot(_) => r.spot_lights += 1,
+                Light::Rectangle(_) | Light::Disk(_) | Light::Sphere(_) | Light::Mesh(_) => {
+                    r.area_lights += 1;
+                }
             }
         }
         r.shadow_rays =

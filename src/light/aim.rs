@@ -1,0 +1,64 @@
+//! What every light's sample needs: finite irradiance, directions rounded once, and a target that a
+//! ray query cannot take for an obstacle.
+
+use glam::DVec3;
+
+use super::LightSample;
+use crate::color::Rgb;
+use crate::math::gamma;
+
+/// No irradiance exceeds this, W/m²: at a light without size it has no bound, and sums must be finite.
+const BRIGHTEST: f64 = 1e30;
+
+/// `color` times `k`, as far as that is finite. In f64, as the square of a distance need not fit f32.
+#[inline]
+pub(super) fn scaled(color: Rgb, k: f64) -> Rgb {
+    let component = |c: f32| (f64::from(c) * k).min(BRIGHTEST) as f32;
+    Rgb::new(component(color.r), component(color.g), component(color.b))
+}
+
+/// The sample that aims from `p` at `target`. None where they are one and there is no direction.
+#[inline]
+pub(super) fn aim(p: DVec3, target: DVec3, irradiance: Rgb) -> Option<LightSample> {
+    let to_target = target - p;
+    let length = to_target.length();
+    let distance = length.min(f64::from(f32::MAX)) as f32;
+    // Also refuses NaN.
+    if !(distance > 0.0) {
+        return None;
+    }
+    Some(LightSample { direction: (to_target / length).as_vec3(), distance, irradiance })
+}
+
+/// How far off its surface the end of a shadow ray must lie, so that the surface does not block it.
+///
+/// - `size`: a bound on the surface's coordinates;
+/// - `reach`: a bound on the distance, along any axis, from the ray's origin to the surface's corners;
+/// - `n`: unit normal.
+///
+/// The surface is traced with corners rounded to f32: γ(1)·`size`, with room for a few operations on
+/// the way there. A query subtracts the ray's origin from the corners, whose plane is then off by a few
+/// roundings of `reach`, and so is the end of a ray whose direction is rounded. Both bound each
+/// coordinate, hence the sum over the normal's, as in [`crate::math::offset_ray_origin`].
+#[inline]
+pub(super) fn lift(size: f64, reach: f64, n: DVec3) -> f64 {
+    (f64::from(gamma(8)) * size + f64::from(gamma(16)) * reach) * n.abs().element_sum()
+}
+
+/// From the unit square to the unit disk, by concentric rings: neighbours stay neighbours, and equal
+/// areas stay equal. Source: Shirley, Chiu, *A Low Distortion Map Between Disk and Square*, JGT 2(3) 1997.
+#[inline]
+pub(super) fn concentric([u, v]: [f64; 2]) -> [f64; 2] {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    if a == 0.0 && b == 0.0 {
+        return [0.0, 0.0];
+    }
+    let (r, phi) = if a.abs() > b.abs() {
+        (a, FRAC_PI_4 * (b / a))
+    } else {
+        (b, FRAC_PI_2 - FRAC_PI_4 * (a / b))
+    };
+    let (sin, cos) = phi.sin_cos();
+    [r * cos, r * sin]
+}
