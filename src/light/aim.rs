@@ -17,12 +17,13 @@ pub(super) fn scaled(color: Rgb, k: f64) -> Rgb {
     Rgb::new(component(color.r), component(color.g), component(color.b))
 }
 
-/// The sample that aims from `p` at `target`. None where they are one and there is no direction.
+/// The sample that aims from `p` at `target`, as far as `short` of it. None where nothing is left and
+/// there is no direction.
 #[inline]
-pub(super) fn aim(p: DVec3, target: DVec3, irradiance: Rgb) -> Option<LightSample> {
+pub(super) fn aim(p: DVec3, target: DVec3, short: f64, irradiance: Rgb) -> Option<LightSample> {
     let to_target = target - p;
     let length = to_target.length();
-    let distance = length.min(f64::from(f32::MAX)) as f32;
+    let distance = (length - short).min(f64::from(f32::MAX)) as f32;
     // Also refuses NaN.
     if !(distance > 0.0) {
         return None;
@@ -30,7 +31,7 @@ pub(super) fn aim(p: DVec3, target: DVec3, irradiance: Rgb) -> Option<LightSampl
     Some(LightSample { direction: (to_target / length).as_vec3(), distance, irradiance })
 }
 
-/// How far off its surface the end of a shadow ray must lie, so that the surface does not block it.
+/// How far off a light's surface a shadow ray must end, so that the surface does not block it.
 ///
 /// - `size`: a bound on the surface's coordinates;
 /// - `reach`: a bound on the distance, along any axis, from the ray's origin to the surface's corners;
@@ -40,6 +41,8 @@ pub(super) fn aim(p: DVec3, target: DVec3, irradiance: Rgb) -> Option<LightSampl
 /// the way there. A query subtracts the ray's origin from the corners, whose plane is then off by a few
 /// roundings of `reach`, and so is the end of a ray whose direction is rounded. Both bound each
 /// coordinate, hence the sum over the normal's, as in [`crate::math::offset_ray_origin`].
+///
+/// The end is where the ray meets the surface that is lifted so far: it stays aimed at the light itself.
 #[inline]
 pub(super) fn lift(size: f64, reach: f64, n: DVec3) -> f64 {
     (f64::from(gamma(8)) * size + f64::from(gamma(16)) * reach) * n.abs().element_sum()

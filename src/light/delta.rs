@@ -65,7 +65,7 @@ impl PointLight {
             Falloff::InverseSquare => inverse_square(self.intensity, p, self.position)?,
             Falloff::None => scaled(self.intensity, std::f64::consts::PI),
         };
-        aim(p, self.position, irradiance)
+        aim(p, self.position, 0.0, irradiance)
     }
 
     pub(super) fn bounds(&self) -> Option<LightBounds> {
@@ -89,7 +89,7 @@ impl SpotLight {
             return None;
         }
         let full = inverse_square(self.intensity, p, self.position)?;
-        aim(p, self.position, scaled(full, profile))
+        aim(p, self.position, 0.0, scaled(full, profile))
     }
 
     /// Intensity at an angle of cosine `cos` from the axis, relative to that on the axis.

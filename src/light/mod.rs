@@ -52,8 +52,8 @@ pub struct LightSample {
     /// Unit vector towards the light.
     pub direction: Vec3,
     /// Distance to the light, infinite for a directional one. A light of some size is itself geometry:
-    /// the distance is to a point so far off its surface that a ray query cannot take the surface for
-    /// something in between.
+    /// the distance ends so far off its surface that a ray query cannot take the surface for something
+    /// in between.
     pub distance: f32,
     /// Irradiance on a plane that faces `direction`, W/m². For a light of some size it is an estimate:
     /// L·cosθ/(pdf·d²) with the probability density by area, or L/pdf by solid angle. Averaged over u,

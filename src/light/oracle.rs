@@ -1,6 +1,9 @@
-//! For the tests of lights: random numbers, means with their errors, and quadrature over surfaces.
+//! For the tests of lights: random numbers, means with their errors, and closed forms.
 
 use glam::DVec3;
+
+use super::Light;
+use crate::sampler::{Dimensions, REPLICATES, Sampler};
 
 /// SplitMix64 (Steele et al., OOPSLA 2014).
 pub(super) struct Random(u64);
@@ -76,23 +79,64 @@ impl Estimate {
     }
 }
 
-/// Irradiance at `p` on a plane of normal `n` from a parallelogram of radiance 1 that shines to the
-/// side of `u` × `v`: the midpoint rule over `steps`² points, L·cosθ·cosθᵢ·dA/d².
-pub(super) fn irradiance_of_parallelogram(
-    [corner, u, v]: [DVec3; 3],
-    p: DVec3,
-    n: DVec3,
-    steps: u32,
-) -> f64 {
-    let area = u.cross(v);
-    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(steps);
-    let points = (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j)));
-    let sum: f64 = points
-        .map(|(i, j)| {
-            let d = corner + u * at(i) + v * at(j) - p;
-            let d2 = d.length_squared();
-            (-d.dot(area)).max(0.0) * d.dot(n).max(0.0) / (d2 * d2)
-        })
-        .sum();
-    sum / f64::from(steps * steps)
+/// The integral of direction times radiance over a polygon of radiance 1, seen from `p`: its component
+/// along a normal is the irradiance on that plane, if all of the polygon is above it. Counter-clockwise
+/// as seen from `p`, the result points away from the polygon; clockwise, towards it.
+///
+/// Half the sum over edges of the angle that an edge fills, times the normal of its plane: Lambert,
+/// *Photometria*, 1760.
+pub(super) fn vector_irradiance(corners: &[DVec3], p: DVec3) -> DVec3 {
+    let next = corners.iter().cycle().skip(1);
+    let edges = corners.iter().zip(next).map(|(&a, &b)| {
+        let (a, b) = (a - p, b - p);
+        let cross = a.cross(b);
+        let angle = cross.length().atan2(a.dot(b));
+        cross.normalize_or_zero() * angle
+    });
+    0.5 * edges.sum::<DVec3>()
+}
+
+/// Whether samples of a light of radiance 1 average to `expected`, the vector irradiance at `p`, in each
+/// component and in the sum that a slanted plane receives.
+pub(super) fn assert_vector_irradiance(light: &Light, p: DVec3, expected: DVec3, seed: u64) {
+    let p32 = p.as_vec3();
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.6, -0.48, 0.64)] {
+        let mut random = Random::new(seed);
+        let estimate = Estimate::of(60_000, |_| {
+            let sample = light.sample(p32, random.square());
+            sample.map_or(0.0, |s| f64::from(s.irradiance.g) * axis.dot(s.direction.as_dvec3()))
+        });
+        let slack = 3e-6 * expected.length();
+        let expected = expected.dot(axis);
+        assert!(
+            estimate.agrees_with(expected) || (estimate.mean - expected).abs() < slack,
+            "{light:?} at {p}: {estimate:?}, not {expected}, along {axis}"
+        );
+    }
+}
+
+/// Root mean square errors of means of `count` samples: of random numbers, and of well-distributed ones.
+/// What is averaged is the irradiance at `p` on a plane of normal `n`.
+pub(super) fn errors(light: &Light, p: DVec3, n: DVec3, count: u32, truth: f64) -> [f64; 2] {
+    const RUNS: u32 = 64;
+    let p = p.as_vec3();
+    let value = |u| {
+        let sample = light.sample(p, u);
+        sample.map_or(0.0, |s| f64::from(s.irradiance.g) * n.dot(s.direction.as_dvec3()).max(0.0))
+    };
+    let mut random = Random::new(17);
+    let rms = |mean: &mut dyn FnMut(u32) -> f64| {
+        let squares: f64 = (0..RUNS).map(|run| (mean(run) - truth).powi(2)).sum();
+        (squares / f64::from(RUNS)).sqrt()
+    };
+    let by_chance = rms(&mut |_| Estimate::of(count, |_| value(random.square())).mean);
+    let stratified = rms(&mut |run| {
+        let mean = Estimate::of(count, |i| {
+            // One replicate of a pixel's samples.
+            let [a, b, ..] = Sampler::new(9, [run, 0], i * REPLICATES).four(Dimensions::Camera);
+            value([a, b])
+        });
+        mean.mean
+    });
+    [by_chance, stratified]
 }

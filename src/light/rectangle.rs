@@ -49,19 +49,20 @@ impl RectangleLight {
         if !(height > lift) {
             return None;
         }
-        let (s, t, irradiance) = match self.spherical(to_corner, n) {
+        let on_light = |s: f64, t: f64| self.corner + self.edge_u * s + self.edge_v * t;
+        let (target, irradiance) = match self.spherical(to_corner, n) {
             Some(spherical) => {
                 let [s, t] = spherical.sample(u);
-                (s, t, scaled(self.radiance, spherical.solid_angle))
+                (on_light(s, t), scaled(self.radiance, spherical.solid_angle))
             }
             None => {
-                let d2 = (to_corner + self.edge_u * u[0] + self.edge_v * u[1]).length_squared();
-                // cos θ = height/d.
-                (u[0], u[1], scaled(self.radiance, area / d2 * (height / d2.sqrt())))
+                let target = on_light(u[0], u[1]);
+                let d = target.distance(p);
+                // L·A·cos θ/d², cos θ = height/d.
+                (target, scaled(self.radiance, area / d * (height / d) / d))
             }
         };
-        let on_light = self.corner + self.edge_u * s + self.edge_v * t;
-        aim(p, on_light + n * lift, irradiance)
+        aim(p, target, target.distance(p) * (lift / height), irradiance)
     }
 
     /// The rectangle as seen from the point that `to_corner` starts at, if it is one and not small.
@@ -151,5 +152,120 @@ impl SphericalRectangle {
             if s.is_nan() { u } else { s }
         };
         [fraction(x, x0, x1, u[0]), fraction(y, y0, y1, u[1])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::oracle::{
+        Estimate, Random, assert_vector_irradiance, errors, vector_irradiance,
+    };
+    use super::super::{Light, MeshLight};
+    use super::*;
+    use std::f64::consts::PI;
+    use std::sync::Arc;
+
+    fn corners(light: &RectangleLight) -> [DVec3; 4] {
+        let (c, u, v) = (light.corner, light.edge_u, light.edge_v);
+        // As seen from the side that it shines to, turned: the vector points towards it.
+        [c, c + v, c + u + v, c + u]
+    }
+
+    fn rectangle(corner: DVec3, edge_u: DVec3, edge_v: DVec3) -> RectangleLight {
+        RectangleLight { corner, edge_u, edge_v, radiance: Rgb::splat(1.0) }
+    }
+
+    /// A unit-radiance rectangle 2 × 1.5 at height 1, shining down, skewed by `skew`.
+    fn ceiling(skew: f64) -> RectangleLight {
+        let (u, v) = (DVec3::new(2.0, 0.0, 0.0), DVec3::new(skew, 0.0, 1.5));
+        rectangle(DVec3::new(0.0, 1.0, 0.0), u, v)
+    }
+
+    #[test]
+    fn a_parallel_plane_below_a_corner() {
+        // The form factor of a rectangle a × b at distance c, opposite a corner: Howell, *A Catalog of
+        // Radiation Heat Transfer Configuration Factors*, B-4.
+        for (a, b, c) in [(2.0, 1.5, 1.0), (2.0, 1.5, 0.01), (0.1, 3.0, 50.0), (1e-3, 1e-3, 2.0)] {
+            let (x, y): (f64, f64) = (a / c, b / c);
+            let term = |x: f64, y: f64| x / x.hypot(1.0) * (y / x.hypot(1.0)).atan();
+            let expected = PI * (term(x, y) + term(y, x)) / (2.0 * PI);
+            let light =
+                Light::Rectangle(rectangle(DVec3::new(0.0, c, 0.0), DVec3::X * a, DVec3::Z * b));
+            let mut random = Random::new(1);
+            let estimate = Estimate::of(50_000, |_| {
+                let s = light.sample(glam::Vec3::ZERO, random.square()).expect("in front of it");
+                f64::from(s.irradiance.r * s.direction.y)
+            });
+            assert!(estimate.agrees_with(expected), "{a} {b} {c}: {estimate:?}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn samples_average_to_the_vector_irradiance() {
+        for light in [ceiling(0.0), ceiling(0.7)] {
+            for p in [
+                DVec3::ZERO,
+                DVec3::new(1.0, 0.9, 0.5),
+                DVec3::new(1.0, 0.9999, 0.5),
+                DVec3::new(-0.5, 0.99, 0.5),
+                DVec3::new(-3.0, 0.9, 5.0),
+                DVec3::new(40.0, -300.0, 5.0),
+                DVec3::new(400.0, -1600.0, 5.0),
+                DVec3::new(4000.0, -30000.0, 5.0),
+            ] {
+                // By area, little but rare bright samples arrive so close.
+                if p.y > 0.95 && light.edge_v.x != 0.0 {
+                    continue;
+                }
+                let p = p.as_vec3().as_dvec3();
+                let expected = vector_irradiance(&corners(&light), p);
+                assert_vector_irradiance(&Light::Rectangle(light.clone()), p, expected, 5);
+            }
+            let above = Light::Rectangle(light).sample(glam::Vec3::new(1.0, 1.1, 0.5), [0.5; 2]);
+            assert_eq!(above, None, "behind it");
+        }
+    }
+
+    #[test]
+    fn solid_angle_varies_less_than_area() {
+        let light = ceiling(0.0);
+        let [a, b, c, d] = corners(&light);
+        let triangles = Arc::from([[a, d, c], [a, c, b]]);
+        let by_area = Light::Mesh(MeshLight::new(triangles, light.radiance, false));
+        let by_angle = Light::Rectangle(light);
+        for (p, gain) in [
+            (DVec3::ZERO, 2.0),
+            (DVec3::new(1.0, 0.5, 0.7), 5.0),
+            (DVec3::new(1.0, 0.9, 0.7), 50.0),
+            (DVec3::new(-0.5, 0.0, 0.7), 3.0),
+        ] {
+            let variance = |light: &Light| {
+                let mut random = Random::new(2);
+                let estimate = Estimate::of(50_000, |_| {
+                    let s = light.sample(p.as_vec3(), random.square()).expect("in front of it");
+                    f64::from(s.irradiance.r * s.direction.y)
+                });
+                estimate.variance
+            };
+            let ratio = variance(&by_area) / variance(&by_angle);
+            println!("at {p}: {ratio:.1} times less variance");
+            assert!(ratio > gain, "{p}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn stratified_numbers_pay() {
+        let light = ceiling(0.0);
+        let p = DVec3::new(0.25, 0.5, 0.25);
+        let truth = vector_irradiance(&corners(&light), p).y;
+        let light = Light::Rectangle(light);
+        let [[few, few_even], [many, many_even]] =
+            [16, 1024].map(|count| errors(&light, p, DVec3::Y, count, truth));
+        println!(
+            "error, 16 to 1024 samples: random {few:.1e} to {many:.1e}, even {few_even:.1e} to {many_even:.1e}"
+        );
+        assert!(few / many < 12.0, "the square root of 64 is 8");
+        assert!(few_even / many_even > 24.0);
+        assert!(many_even < many / 10.0);
     }
 }

@@ -3,7 +3,6 @@
 use glam::{DVec3, Vec3};
 
 use super::super::bounds::{LightBounds, angle_between};
-use crate::math::gamma;
 
 /// A bound on a group of lights. What is rounded is rounded outward.
 #[derive(Debug, Clone, Copy)]
@@ -37,9 +36,7 @@ impl Node {
     fn new(bounds: &LightBounds, link: u32) -> Self {
         let exact = bounds.bounds.center();
         let center = exact.as_vec3();
-        // Samples aim at points that are lifted off a light by less than this.
-        let lift = f64::from(gamma(64)) * exact.abs().max_element();
-        let radius = bounds.radius * (1.0 + 1e-5) + exact.distance(center.as_dvec3()) + lift;
+        let radius = bounds.radius * (1.0 + 1e-6) + exact.distance(center.as_dvec3());
         let intensity = bounds.intensity.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX));
         let axis = fold(bounds.cone.axis);
         let half_angle = bounds.cone.half_angle + angle_between(bounds.cone.axis, unfold(axis));
@@ -73,7 +70,7 @@ impl Node {
     /// fills. A distance within the sphere counts as its radius.
     #[inline]
     pub(super) fn importance(&self, p: DVec3, n: Option<DVec3>) -> f64 {
-        /// Angles are rounded: light from a little below the horizon counts.
+        /// Directions are rounded: light from a little below the horizon counts.
         const SLACK: f64 = 1e-5;
         /// A grazing angle's weight: bounds are loose, and its light may be all there is.
         const LEAST: f64 = 1e-2;
