@@ -6,10 +6,10 @@
 //! Tree Splitting*, PACMCGIT 1(2) 2018; pbrt 4ed §12.6.3.
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use self::node::Node;
 use super::Light;
-use super::bounds::LightBounds;
 
 mod build;
 mod node;
@@ -53,20 +53,13 @@ impl LightTree {
     /// If there are 2³⁰ lights or more.
     pub fn new(lights: &[Light]) -> Self {
         assert!(lights.len() < 1 << 30, "more lights than indices");
+        let bounds: Vec<_> = lights.par_iter().with_min_len(1 << 10).map(Light::bounds).collect();
         let mut tree = Self { leaves: vec![DARK; lights.len()], ..Self::default() };
-        let mut bounded: Vec<(u32, LightBounds)> = Vec::new();
-        for (index, light) in (0..).zip(lights) {
-            match light.bounds() {
-                None => {
-                    tree.leaves[index as usize] = ALWAYS;
-                    tree.always.push(index);
-                }
-                // Also refuses NaN.
-                Some(bounds) if bounds.intensity > 0.0 => bounded.push((index, bounds)),
-                Some(_) => {}
-            }
+        for (index, _) in (0..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()) {
+            tree.leaves[index as usize] = ALWAYS;
+            tree.always.push(index);
         }
-        (tree.nodes, tree.parents) = build::build(&bounded);
+        (tree.nodes, tree.parents) = build::build(&bounds);
         for (index, node) in (0..).zip(&tree.nodes) {
             if let Some(light) = node.light() {
                 tree.leaves[light as usize] = index;

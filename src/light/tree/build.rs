@@ -8,6 +8,9 @@ use super::node::Node;
 /// Cells along each axis whose borders are tried as splits. Source: pbrt 4ed §12.6.3.
 const CELLS: usize = 12;
 
+/// So few lights are halved along the longest axis: a better split is not worth the search.
+const FEW: usize = 4;
+
 /// What the choice of a split needs of a light; f32 will do.
 #[derive(Debug, Clone, Copy)]
 struct Item {
@@ -16,65 +19,112 @@ struct Item {
     /// Intensity times the mean direction of its cone.
     moment: Vec3,
     intensity: f32,
-    /// Index into the bounded lights.
+    /// Index of the light.
     index: u32,
 }
 
-/// A node's part of the items.
-#[derive(Debug, Clone, Copy, Default)]
-struct Part {
-    first: u32,
-    count: u32,
-}
-
-/// Nodes, depth first, and the parent of each, over (index, bound) of lights.
-pub(super) fn build(lights: &[(u32, LightBounds)]) -> (Vec<Node>, Vec<u32>) {
-    if lights.is_empty() {
+/// Nodes, depth first, and the parent of each, over the lights of `bounds` that emit something.
+pub(super) fn build(bounds: &[Option<LightBounds>]) -> (Vec<Node>, Vec<u32>) {
+    let lights = (0..).zip(bounds).filter_map(|(i, b)| b.as_ref().map(|b| (i, b)));
+    // Also refuses NaN.
+    let lights = lights.filter(|(_, b)| b.intensity > 0.0);
+    let mut items: Vec<Item> = lights.map(|(i, b)| Item::new(i, b)).collect();
+    if items.is_empty() {
         return (Vec::new(), Vec::new());
     }
-    let mut items: Vec<Item> = (0..).zip(lights).map(|(i, (_, b))| Item::new(i, b)).collect();
-    // A subtree over n lights has 2n − 1 nodes, so where each begins is known before it is made.
-    let mut parts = vec![Part::default(); 2 * lights.len() - 1];
-    let mut parents = vec![0; parts.len()];
-    let mut open = vec![(0, Part { first: 0, count: items.len() as u32 })];
-    while let Some((node, part)) = open.pop() {
-        parts[node as usize] = part;
-        if part.count > 1 {
-            let left = split(&mut items[part.first as usize..][..part.count as usize]) as u32;
-            let right = Part { first: part.first + left, count: part.count - left };
-            let children = [(node + 1, Part { count: left, ..part }), (node + 2 * left, right)];
-            for (child, part) in children {
-                parents[child as usize] = node;
-                open.push((child, part));
-            }
-        }
-    }
-    (bounded_nodes(lights, &items, &parts), parents)
+    let size = 2 * items.len() - 1;
+    let (mut nodes, mut parents) = (vec![Node::default(); size], vec![0; size]);
+    let branch =
+        Branch { bounds, items: &mut items, nodes: &mut nodes, parents: &mut parents, root: 0 };
+    branch.grow(JOINS);
+    (nodes, parents)
 }
 
-/// The nodes with their bounds. Backwards, children come before their parent, the left one last.
-fn bounded_nodes(lights: &[(u32, LightBounds)], items: &[Item], parts: &[Part]) -> Vec<Node> {
-    let mut nodes = Vec::with_capacity(parts.len());
-    let mut done: Vec<LightBounds> = Vec::new();
-    for (node, part) in parts.iter().enumerate().rev() {
-        let children = if part.count > 1 { done.pop().zip(done.pop()) } else { None };
-        let bounds = match children {
-            None => {
-                let (light, bounds) = &lights[items[part.first as usize].index as usize];
-                nodes.push(Node::leaf(bounds, *light));
-                *bounds
-            }
-            Some((left, right)) => {
-                let bounds = left.union(&right);
-                let right = node as u32 + 2 * parts[node + 1].count;
-                nodes.push(Node::inner(&bounds, right));
-                bounds
-            }
+/// Levels of the tree whose children may be built by two threads.
+const JOINS: u32 = 10;
+
+/// Branches of fewer lights are built by one thread.
+const GRAIN: usize = 1 << 12;
+
+/// A part of the tree, with what is its own of each array. A branch over n lights has 2n − 1 nodes, so
+/// where each begins is known before it is made.
+struct Branch<'a> {
+    bounds: &'a [Option<LightBounds>],
+    items: &'a mut [Item],
+    nodes: &'a mut [Node],
+    parents: &'a mut [u32],
+    /// Index of its first node in the whole tree.
+    root: u32,
+}
+
+impl Branch<'_> {
+    /// Makes its nodes, and tells the bound of all. Recursion ends after `joins` levels.
+    fn grow(self, joins: u32) -> LightBounds {
+        if joins == 0 || self.items.len() <= GRAIN {
+            return self.grow_alone();
+        }
+        let left = split(self.items);
+        let right_root = 2 * left;
+        let (items, right_items) = self.items.split_at_mut(left);
+        let (nodes, right_nodes) = self.nodes.split_at_mut(right_root);
+        let (parents, right_parents) = self.parents.split_at_mut(right_root);
+        let root = self.root;
+        (parents[1], right_parents[0]) = (root, root);
+        let (node, nodes) = nodes.split_first_mut().expect("it has two children");
+        let parents = &mut parents[1..];
+        let left = Self { bounds: self.bounds, items, nodes, parents, root: root + 1 };
+        let right = Self {
+            bounds: self.bounds,
+            items: right_items,
+            nodes: right_nodes,
+            parents: right_parents,
+            root: root + right_root as u32,
         };
-        done.push(bounds);
+        let right_root = right.root;
+        let (left, right) = rayon::join(|| left.grow(joins - 1), || right.grow(joins - 1));
+        let bounds = left.union(&right);
+        *node = Node::inner(&bounds, right_root);
+        bounds
     }
-    nodes.reverse();
-    nodes
+
+    /// The same on one thread and without recursion: trees may be deep.
+    fn grow_alone(self) -> LightBounds {
+        // First and number of the items of each node.
+        let mut parts = vec![(0, 0); self.nodes.len()];
+        let mut open = vec![(0, 0, self.items.len())];
+        while let Some((node, first, count)) = open.pop() {
+            parts[node] = (first, count);
+            if count > 1 {
+                let left = split(&mut self.items[first..first + count]);
+                let children =
+                    [(node + 1, first, left), (node + 2 * left, first + left, count - left)];
+                for child in children {
+                    self.parents[child.0] = self.root + node as u32;
+                    open.push(child);
+                }
+            }
+        }
+        // Backwards: children come before their parent, the left one last.
+        let mut done: Vec<LightBounds> = Vec::new();
+        for (node, &(first, count)) in parts.iter().enumerate().rev() {
+            let children = if count > 1 { done.pop().zip(done.pop()) } else { None };
+            let (compact, bounds) = match children {
+                None => {
+                    let light = self.items[first].index;
+                    let bounds = self.bounds[light as usize].expect("it has bounds");
+                    (Node::leaf(&bounds, light), bounds)
+                }
+                Some((left, right)) => {
+                    let bounds = left.union(&right);
+                    let right = node + 2 * parts[node + 1].1;
+                    (Node::inner(&bounds, self.root + right as u32), bounds)
+                }
+            };
+            self.nodes[node] = compact;
+            done.push(bounds);
+        }
+        done.pop().expect("the root's")
+    }
 }
 
 /// Sorts items into two parts, neither empty, and tells how many are in the first.
@@ -82,8 +132,13 @@ fn split(items: &mut [Item]) -> usize {
     let centers = items.iter().fold(Cell::default(), |cell, item| cell.with_center(item.center));
     let size = centers.max - centers.min;
     let longest = size.max_element();
-    // Two, or all at one place (or not finite in f32).
-    if items.len() == 2 || !(longest > 0.0 && longest.is_finite()) {
+    // All at one place (or not finite in f32).
+    if !(longest > 0.0 && longest.is_finite()) {
+        return items.len() / 2;
+    }
+    if items.len() <= FEW {
+        let axis = size.to_array().iter().position(|&s| s == longest).unwrap_or(0);
+        items.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));
         return items.len() / 2;
     }
     let cell_of = |item: &Item, axis: usize| {
