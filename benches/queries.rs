@@ -161,7 +161,7 @@ fn shadow_blocks<Q: RayQuery>(scene: &Scene, query: &Q, camera: &[RayBlock]) -> 
         for lane in rays.lanes() {
             let Some(hit) = hits.get(lane) else { continue };
             let point = scene.surface(&rays.get(lane), hit);
-            let light = scene.lights[0].sample(point.position).expect("a sun");
+            let light = scene.lights[0].sample(point.position, [0.5, 0.5]).expect("a sun");
             if light.direction.dot(point.geometric_normal) > 0.0 {
                 block.set(lane, &scene.spawn(&point, light.direction, light.distance));
             }

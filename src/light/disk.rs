@@ -66,7 +66,7 @@ impl DiskLight {
 mod tests {
     use super::super::Light;
     use super::super::oracle::{
-        Estimate, Random, assert_vector_irradiance, errors, vector_irradiance,
+        Estimate, Random, assert_vector_irradiance, errors, tell, vector_irradiance,
     };
     use super::*;
     use std::f64::consts::{PI, TAU};
@@ -125,7 +125,7 @@ mod tests {
         let truth = expected(&light, DVec3::ZERO).y;
         let light = Light::Disk(light);
         let [many, many_even] = errors(&light, DVec3::ZERO, DVec3::Y, 1024, truth);
-        println!("error of 1024 samples: random {many:.1e}, even {many_even:.1e}");
+        tell(&format!("error of 1024 samples: random {many:.1e}, even {many_even:.1e}"));
         assert!(many_even < many / 10.0);
     }
 }

@@ -120,7 +120,7 @@ fn low_distortion([u, v]: [f64; 2]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::super::Light;
-    use super::super::oracle::{assert_vector_irradiance, errors, vector_irradiance};
+    use super::super::oracle::{assert_vector_irradiance, errors, tell, vector_irradiance};
     use super::*;
 
     /// A wavy ceiling of n × n quads of different sizes, shining down.
@@ -213,7 +213,7 @@ mod tests {
         let truth = expected(&triangles, DVec3::ZERO, false).y;
         let light = Light::Mesh(MeshLight::new(triangles.into(), Rgb::splat(1.0), false));
         let [many, many_even] = errors(&light, DVec3::ZERO, DVec3::Y, 1024, truth);
-        println!("error of 1024 samples: random {many:.1e}, even {many_even:.1e}");
+        tell(&format!("error of 1024 samples: random {many:.1e}, even {many_even:.1e}"));
         assert!(many_even < many / 5.0);
     }
 }

@@ -5,6 +5,12 @@ use glam::DVec3;
 use super::Light;
 use crate::sampler::{Dimensions, REPLICATES, Sampler};
 
+/// A measured figure, for `--nocapture`.
+#[allow(clippy::print_stdout, reason = "for those who ask")]
+pub(super) fn tell(figure: &str) {
+    println!("{figure}");
+}
+
 /// SplitMix64 (Steele et al., OOPSLA 2014).
 pub(super) struct Random(u64);
 

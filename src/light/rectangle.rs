@@ -158,7 +158,7 @@ impl SphericalRectangle {
 #[cfg(test)]
 mod tests {
     use super::super::oracle::{
-        Estimate, Random, assert_vector_irradiance, errors, vector_irradiance,
+        Estimate, Random, assert_vector_irradiance, errors, tell, vector_irradiance,
     };
     use super::super::{Light, MeshLight};
     use super::*;
@@ -248,7 +248,7 @@ mod tests {
                 estimate.variance
             };
             let ratio = variance(&by_area) / variance(&by_angle);
-            println!("at {p}: {ratio:.1} times less variance");
+            tell(&format!("at {p}: {ratio:.1} times less variance"));
             assert!(ratio > gain, "{p}: {ratio}");
         }
     }
@@ -261,9 +261,9 @@ mod tests {
         let light = Light::Rectangle(light);
         let [[few, few_even], [many, many_even]] =
             [16, 1024].map(|count| errors(&light, p, DVec3::Y, count, truth));
-        println!(
+        tell(&format!(
             "error, 16 to 1024 samples: random {few:.1e} to {many:.1e}, even {few_even:.1e} to {many_even:.1e}"
-        );
+        ));
         assert!(few / many < 12.0, "the square root of 64 is 8");
         assert!(few_even / many_even > 24.0);
         assert!(many_even < many / 10.0);

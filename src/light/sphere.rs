@@ -83,7 +83,7 @@ impl SphereLight {
 #[cfg(test)]
 mod tests {
     use super::super::Light;
-    use super::super::oracle::{Random, assert_vector_irradiance, errors};
+    use super::super::oracle::{Random, assert_vector_irradiance, errors, tell};
     use super::*;
 
     fn lamp(radius: f64) -> SphereLight {
@@ -137,7 +137,7 @@ mod tests {
         let n = (to_center.normalize() + DVec3::X * 0.3).normalize();
         let truth = PI * s2 * n.dot(to_center.normalize());
         let [many, many_even] = errors(&Light::Sphere(light), p, n, 1024, truth);
-        println!("error of 1024 samples: random {many:.1e}, even {many_even:.1e}");
+        tell(&format!("error of 1024 samples: random {many:.1e}, even {many_even:.1e}"));
         assert!(many_even < many / 10.0);
     }
 }
