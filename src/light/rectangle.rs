@@ -93,6 +93,12 @@ impl RectangleLight {
     }
 }
 
+/// √(a² + b²); squares of lengths that f32 can hold fit f64.
+#[inline]
+fn length(a: f64, b: f64) -> f64 {
+    (a * a + b * b).sqrt()
+}
+
 /// A rectangle projected to the unit sphere around the origin: points of it uniform in solid angle.
 ///
 /// Source: Ureña, Fajardo, King, *An Area-Preserving Parametrization for Spherical Rectangles*, EGSR
@@ -117,14 +123,14 @@ impl SphericalRectangle {
         let (x, y, z) = ([corner.x, corner.x + a], [corner.y, corner.y + b], corner.z);
         // Normals of the edges' planes: their z component, and the length of the rest.
         let normal = |s: f64| {
-            let length = s.hypot(z);
-            (s / length, (z / length).abs())
+            let l = length(s, z);
+            (s / l, (z / l).abs())
         };
         let n = [normal(-y[0]), normal(x[1]), normal(y[1]), normal(-x[0])];
         // The angle whose cosine is −sᵢ·sⱼ; its sine² is 1 − sᵢ²sⱼ² = cᵢ² + sᵢ²·cⱼ².
         let angle = |i: usize, j: usize| {
             let ((si, ci), (sj, cj)) = (n[i], n[j]);
-            ci.hypot(si * cj).atan2(-si * sj)
+            length(ci, si * cj).atan2(-si * sj)
         };
         let k = std::f64::consts::TAU - angle(2, 3) - angle(3, 0);
         let solid_angle = angle(0, 1) + angle(1, 2) - k;
@@ -137,13 +143,13 @@ impl SphericalRectangle {
         let ([x0, x1], [y0, y1]) = (self.x, self.y);
         let (sin, cos) = (u[0] * self.solid_angle + self.k).sin_cos();
         let f = (cos * self.b[0] - self.b[1]) / sin;
-        let cu = 1f64.copysign(f) / f.hypot(self.b[0]);
+        let cu = 1f64.copysign(f) / length(f, self.b[0]);
         let cu = cu.clamp(-1.0, 1.0);
         let x = -(cu * self.z) / ((1.0 - cu) * (1.0 + cu)).sqrt();
         let x = x.clamp(x0, x1);
 
-        let d = x.hypot(self.z);
-        let [h0, h1] = [y0, y1].map(|y| y / y.hypot(d));
+        let d = length(x, self.z);
+        let [h0, h1] = [y0, y1].map(|y| y / length(y, d));
         let h = h0 + u[1] * (h1 - h0);
         let y = (h * d / ((1.0 - h) * (1.0 + h)).sqrt()).clamp(y0, y1);
         // 0/0 on the sphere's great circles: anywhere will do there.
