@@ -28,7 +28,7 @@
 //! | [`integrator`] | one file per algorithm: rays in, radiance out |
 //! | [`scene`] | what was written, and the immutable, query-ready scene made of it |
 //! | [`accel`] · [`light`] · [`material`] · [`camera`] | the seam for ray queries · emission · scattering · viewing rays |
-//! | `embree` · [`geometry`] · [`film`] · [`sampler`] | native handles · meshes and shapes · sums and filters · numbers in [0, 1) |
+//! | `embree` · [`geometry`] · [`film`] · [`sampler`] · [`texture`] | native handles · meshes and shapes · sums and filters · numbers in [0, 1) · what varies over a surface |
 //! | [`math`] · [`color`] | the floor: rays, boxes, rounding · linear Rec.709 and sRGB |
 //!
 //! Units are metres, radians and seconds; radiance is in W·m⁻²·sr⁻¹ per Rec.709 band; space is
@@ -51,3 +51,4 @@ pub mod measure;
 pub mod render;
 pub mod sampler;
 pub mod scene;
+pub mod texture;
