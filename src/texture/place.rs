@@ -45,7 +45,7 @@ const FAR: f64 = 1e100;
 
 impl Placement {
     /// A footprint in the texture's own space.
-    pub fn region(&self, point: &TexturePoint) -> Region {
+    pub(super) fn region(&self, point: &TexturePoint) -> Region {
         let footprint = &point.footprint;
         let (position, normal, width) = match self.space {
             Space::Position => (point.position, footprint.normal.as_dvec3(), footprint.width),
@@ -64,7 +64,7 @@ impl Placement {
 
     /// The gradient of a texture's value, from values about the middle of `region`. `size` is that
     /// of the texture's smallest features in its own space.
-    pub fn gradient(
+    pub(super) fn gradient(
         &self,
         region: &Region,
         size: f64,
