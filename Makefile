@@ -27,7 +27,7 @@ test: ## Runs every test, with and without Embree
 verify: test ## Runs what takes longer: many more random rays and scenes
 	ALHAZEN_VERIFY=1 $(CARGO) test --locked --release
 
-bench: setup ## Measures ray queries against bare Embree
+bench: setup ## Measures ray queries, the variants, every option, and other renderers
 	$(CARGO) bench --locked
 
 lint: setup ## Formatting, clippy and documentation without warnings

@@ -27,7 +27,7 @@
 //! | [`render`] · [`io`] | tiles, threads and stopping · files: scenes, meshes and pictures in, pictures out |
 //! | [`integrator`] | one file per algorithm: rays in, radiance out |
 //! | [`scene`] | what was written, and the immutable, query-ready scene made of it |
-//! | [`accel`] · [`light`] · [`material`] · [`camera`] | the seam for ray queries · emission · scattering · viewing rays |
+//! | [`accel`] · [`light`] · [`material`] · [`medium`] · [`camera`] | the seam for ray queries · emission · scattering · fog and nested glass · viewing rays |
 //! | `embree` · [`geometry`] · [`film`] · [`sampler`] · [`texture`] | native handles · meshes and shapes · sums and filters · numbers in [0, 1) · what varies over a surface |
 //! | [`math`] · [`color`] | the floor: rays, boxes, rounding · linear Rec.709 and sRGB |
 //!
@@ -48,6 +48,7 @@ pub mod light;
 pub mod material;
 pub mod math;
 pub mod measure;
+pub mod medium;
 pub mod render;
 pub mod sampler;
 pub mod scene;

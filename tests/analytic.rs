@@ -13,7 +13,7 @@ use alhazen::material::{Material, Phong, PhongModel};
 use alhazen::render::{RenderJob, render};
 use alhazen::scene::{
     CameraDesc, IntegratorKind, LightDesc, Location, MaterialDesc, ObjectDesc, PlaceDesc, Scene,
-    SceneDesc, ShapeDesc,
+    SceneDesc, Shadows, ShapeDesc,
 };
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -33,6 +33,7 @@ fn looking_down() -> SceneDesc {
             target: DVec3::ZERO,
             up: DVec3::NEG_Z,
         }),
+        lens: None,
     });
     desc.ambient = Some(Rgb::BLACK);
     desc
@@ -45,7 +46,7 @@ fn square(half: f32) -> TriangleMesh {
 }
 
 fn add_material(desc: &mut SceneDesc, name: &str, material: Material) {
-    desc.materials.push(MaterialDesc { name: name.to_owned(), material });
+    desc.materials.push(MaterialDesc::new(name, material));
 }
 
 fn add_mesh(desc: &mut SceneDesc, mesh: TriangleMesh, material: &str) -> usize {
@@ -119,6 +120,7 @@ fn the_lectures_light_gives_its_equation_literally() {
             specular: Rgb::splat(0.8),
             shininess: exponent as f32,
             model,
+            ..Phong::default()
         };
         add_material(&mut desc, "plastic", Material::Phong(phong));
         add_mesh(&mut desc, square(3.0), "plastic");
@@ -163,7 +165,7 @@ fn a_directional_light_on_a_sphere() {
 fn hard_shadows_are_where_projection_puts_them() {
     for shadows in [true, false] {
         let mut desc = looking_down();
-        desc.settings.shadows = shadows;
+        desc.settings.shadows = if shadows { Shadows::Opaque } else { Shadows::None };
         add_material(&mut desc, "grey", diffuse(1.0));
         add_mesh(&mut desc, square(3.0), "grey");
         let plate = add_mesh(&mut desc, square(0.4), "grey");
@@ -314,8 +316,9 @@ fn the_stated_error_is_the_true_one() {
         irradiance: Rgb::splat(4.0),
     });
     let scene = Scene::build_quietly(desc, AccelKind::default()).unwrap();
-    let films: Vec<Film> =
-        (0..64).map(|seed| render(&scene, &RenderJob { seed, crop: None }, &()).film).collect();
+    let films: Vec<Film> = (0..64)
+        .map(|seed| render(&scene, &RenderJob { seed, ..RenderJob::default() }, &()).film)
+        .collect();
     let n = films.len() as f64;
     let (mut stated, mut shown) = (0.0, 0.0);
     for i in 0..films[0].mean.len() {

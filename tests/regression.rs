@@ -200,5 +200,5 @@ fn the_hash_is_of_what_is_rendered() {
     };
     assert_ne!(hash(&[]), hash(&["--integrator", "flat"]));
     assert_ne!(hash(&[]), hash(&["--samples", "5"]));
-    assert_eq!(hash(&[]), hash(&["--integrator", "direct"]), "the default, said aloud");
+    assert_eq!(hash(&[]), hash(&["--integrator", "whitted"]), "the default, said aloud");
 }

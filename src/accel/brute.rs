@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 
 use super::world::{CopyRef, Geometry, World, affine_from_rows};
 use super::{AccelInfo, Hit, RayQuery};
-use crate::geometry::{Sphere, TriangleMesh, intersect_triangle};
+use crate::geometry::{AnalyticShape, Disk, Sphere, TriangleMesh, intersect_triangle};
 use crate::math::{Bounds, Ray};
 
 /// The oracle: no hierarchy; boxes around whole geometries only.
@@ -28,6 +28,7 @@ struct Part {
 enum Shape {
     Mesh(TriangleMesh),
     Spheres(Arc<Vec<Sphere>>),
+    Disks(Arc<Vec<Disk>>),
 }
 
 /// One copy of a prototype.
@@ -95,6 +96,7 @@ impl Part {
         let shape = match geometry {
             Geometry::Mesh(mesh) => Shape::Mesh(mesh.clone()),
             Geometry::Spheres(spheres) => Shape::Spheres(Arc::clone(spheres)),
+            Geometry::Disks(disks) => Shape::Disks(Arc::clone(disks)),
         };
         Self { shape, bounds: Bounds { min: b.min - pad, max: b.max + pad } }
     }
@@ -119,13 +121,23 @@ impl Part {
                     }
                 }
             }
-            Shape::Spheres(spheres) => {
-                for (i, sphere) in spheres.iter().enumerate() {
-                    if let Some(t) = sphere.intersect(o, d, t_min, *t_max) {
-                        *t_max = found(t, 0.0, 0.0, i as u32);
-                    }
-                }
-            }
+            Shape::Spheres(spheres) => visit_each(spheres, o, d, t_min, t_max, found),
+            Shape::Disks(disks) => visit_each(disks, o, d, t_min, t_max, found),
+        }
+    }
+}
+
+fn visit_each<S: AnalyticShape>(
+    shapes: &[S],
+    o: DVec3,
+    d: DVec3,
+    t_min: f64,
+    t_max: &mut f64,
+    mut found: impl FnMut(f64, f64, f64, u32) -> f64,
+) {
+    for (i, shape) in (0u32..).zip(shapes) {
+        if let Some(t) = shape.intersect(o, d, t_min, *t_max) {
+            *t_max = found(t, 0.0, 0.0, i);
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::embree::{
     Quality, RayHitPacket, RayPacket, Scene, SceneBuilder, SceneFlags, UserBounds, UserGeometry,
     UserHit,
 };
-use crate::geometry::Sphere;
+use crate::geometry::AnalyticShape;
 use crate::math::Ray;
 
 /// Sets with more copies than this become instance arrays: 90 bytes a copy instead of 330, for
@@ -278,10 +278,8 @@ fn attach_group(
                 Arc::clone(&mesh.triangles),
                 quality,
             )?,
-            Geometry::Spheres(spheres) => {
-                let bounds = spheres.iter().map(outer_bounds).collect();
-                embree::Geometry::user(device, bounds, Arc::new(Spheres(Arc::clone(spheres))))?
-            }
+            Geometry::Spheres(spheres) => user_geometry(device, spheres)?,
+            Geometry::Disks(disks) => user_geometry(device, disks)?,
         };
         let id = builder.attach(geometry);
         // Hits are told apart by these ids: ours are Embree's.
@@ -339,24 +337,32 @@ fn commit_watched(
     })
 }
 
-/// The box of a sphere, rounded outward to f32.
-fn outer_bounds(sphere: &Sphere) -> UserBounds {
-    let b = sphere.bounds();
+fn user_geometry<S: AnalyticShape>(
+    device: &Device,
+    shapes: &Arc<Vec<S>>,
+) -> Result<embree::Geometry, EmbreeError> {
+    let bounds = shapes.iter().map(outer_bounds).collect();
+    embree::Geometry::user(device, bounds, Arc::new(Shapes(Arc::clone(shapes))))
+}
+
+/// The box of a shape, rounded outward to f32.
+fn outer_bounds(shape: &impl AnalyticShape) -> UserBounds {
+    let b = shape.bounds();
     let down = |p: DVec3| p.as_vec3().to_array().map(f32::next_down);
     let up = |p: DVec3| p.as_vec3().to_array().map(f32::next_up);
     UserBounds { lower: down(b.min), upper: up(b.max) }
 }
 
-/// Spheres as Embree's callbacks see them: solved in f64.
-struct Spheres(Arc<Vec<Sphere>>);
+/// Shapes of one kind as Embree's callbacks see them: solved in f64.
+struct Shapes<S>(Arc<Vec<S>>);
 
-impl UserGeometry for Spheres {
+impl<S: AnalyticShape> UserGeometry for Shapes<S> {
     #[inline]
     fn intersect(&self, primitive: u32, ray: &embree::Ray) -> Option<UserHit> {
-        let sphere = self.0.get(primitive as usize)?;
+        let shape = self.0.get(primitive as usize)?;
         let (origin, direction) =
             (DVec3::from(ray.origin.map(f64::from)), DVec3::from(ray.direction.map(f64::from)));
-        let t = sphere.intersect(origin, direction, f64::from(ray.t_min), f64::from(ray.t_max))?;
+        let t = shape.intersect(origin, direction, f64::from(ray.t_min), f64::from(ray.t_max))?;
         Some(UserHit { t: t as f32, u: 0.0, v: 0.0 })
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use crate::geometry::{Sphere, TriangleMesh};
+use crate::geometry::{AnalyticShape, Disk, Sphere, TriangleMesh};
 use crate::math::Bounds;
 
 /// One geometry: many primitives of one kind.
@@ -14,6 +14,8 @@ pub enum Geometry {
     Mesh(TriangleMesh),
     /// Spheres.
     Spheres(Arc<Vec<Sphere>>),
+    /// Flat disks.
+    Disks(Arc<Vec<Disk>>),
 }
 
 /// Geometries in one space.
@@ -68,6 +70,7 @@ impl Geometry {
         match self {
             Self::Mesh(mesh) => mesh.triangles.len(),
             Self::Spheres(spheres) => spheres.len(),
+            Self::Disks(disks) => disks.len(),
         }
     }
 
@@ -80,11 +83,14 @@ impl Geometry {
     pub fn bounds(&self) -> Bounds {
         match self {
             Self::Mesh(mesh) => mesh.bounds(),
-            Self::Spheres(spheres) => {
-                spheres.iter().map(Sphere::bounds).fold(Bounds::EMPTY, Bounds::union)
-            }
+            Self::Spheres(spheres) => bounds_of(spheres),
+            Self::Disks(disks) => bounds_of(disks),
         }
     }
+}
+
+fn bounds_of(shapes: &[impl AnalyticShape]) -> Bounds {
+    shapes.iter().map(AnalyticShape::bounds).fold(Bounds::EMPTY, Bounds::union)
 }
 
 impl World {
@@ -110,6 +116,10 @@ impl World {
                 Geometry::Mesh(mesh) => add(mesh.support(directions)),
                 Geometry::Spheres(spheres) => spheres.iter().for_each(|s| {
                     add(directions.map(|d| d.dot(s.center) + d.length() * s.radius));
+                }),
+                Geometry::Disks(disks) => disks.iter().for_each(|disk| {
+                    let across = |d: DVec3| d.reject_from_normalized(disk.normal).length();
+                    add(directions.map(|d| d.dot(disk.center) + across(d) * disk.radius));
                 }),
             }
         }

@@ -6,7 +6,7 @@
 
 use glam::{DMat4, DVec2, DVec3};
 
-use crate::math::{Bounds, Ray};
+use crate::math::{Bounds, Ray, concentric_disk};
 
 /// How points are projected.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +21,15 @@ pub enum Projection {
         /// Height of the picture in world units.
         height: f64,
     },
+}
+
+/// A thin lens: what is not in its plane of focus is blurred.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// Radius of the aperture, > 0.
+    pub radius: f64,
+    /// Distance of the plane in focus, along the view, > 0.
+    pub focus_distance: f64,
 }
 
 /// A camera's place: orthonormal axes and the eye.
@@ -74,12 +83,16 @@ impl Pose {
 pub struct Camera {
     pose: Pose,
     projection: Projection,
+    /// A pinhole where there is none.
+    lens: Option<Lens>,
     /// Pixels.
     size: DVec2,
     /// World units of a pixel: on the plane at distance 1, or of the parallel picture.
     pixel: f64,
     /// Where rays start when the camera is far; none where they start at the camera.
     start: Option<Bounds>,
+    /// Whether rays that pass that box by are rays all the same.
+    keeps_all: bool,
 }
 
 /// The camera counts as far from here on, in diagonals of the scene's box. Nearer than this the
@@ -91,6 +104,7 @@ impl Camera {
     pub fn new(
         pose: Pose,
         projection: Projection,
+        lens: Option<Lens>,
         [width, height]: [u32; 2],
         scene: Bounds,
     ) -> Self {
@@ -104,7 +118,7 @@ impl Camera {
         // A little larger, so that what lies in its faces is not before the start.
         let pad = DVec3::splat(1e-3 * diagonal);
         let start = far.then(|| Bounds { min: scene.min - pad, max: scene.max + pad });
-        Self { pose, projection, size, pixel, start }
+        Self { pose, projection, lens, size, pixel, start, keeps_all: false }
     }
 
     /// Where the camera stands, and its axes.
@@ -127,13 +141,55 @@ impl Camera {
         }
     }
 
-    /// The ray through `film` (see [`Camera::ray_f64`]), ready to be traced. None where it passes the
-    /// scene's box by, which is tested only where the camera is far.
+    /// The ray from a point of the lens, `on_lens` in the unit disk, to where the ray of the pinhole
+    /// meets the plane of focus: all of them meet there.
+    fn through_lens(
+        &self,
+        lens: &Lens,
+        (origin, direction): (DVec3, DVec3),
+        on_lens: DVec2,
+    ) -> (DVec3, DVec3) {
+        let pose = &self.pose;
+        let offset = (pose.right * on_lens.x + pose.up * on_lens.y) * lens.radius;
+        let focus = direction * (lens.focus_distance / direction.dot(pose.forward));
+        (origin + offset, (focus - offset).normalize())
+    }
+
+    /// From now on rays that pass a far scene by are rays too, of no length: what is between the scene
+    /// and the camera is seen on them.
+    pub fn keep_all_rays(&mut self) {
+        self.keeps_all = true;
+    }
+
+    /// Whether rays start at the scene's box instead of the camera.
+    pub fn is_far(&self) -> bool {
+        self.start.is_some()
+    }
+
+    /// How wide the rays of a pixel are: at their start, in world units, and how much wider for each
+    /// unit of distance.
+    pub fn pixel_cone(&self) -> (f32, f32) {
+        match self.projection {
+            Projection::Perspective { .. } => (0.0, self.pixel as f32),
+            Projection::Orthographic { .. } => (self.pixel as f32, 0.0),
+        }
+    }
+
+    /// The ray through `film` (see [`Camera::ray_f64`]), ready to be traced; `on_lens` in the unit
+    /// square chooses the point of the lens, if there is one. None where it passes the scene's box by,
+    /// which is tested only where the camera is far.
     #[inline]
-    pub fn ray(&self, film: DVec2) -> Option<Ray> {
-        let (mut origin, direction) = self.ray_f64(film);
+    pub fn ray(&self, film: DVec2, on_lens: [f32; 2]) -> Option<Ray> {
+        let (mut origin, mut direction) = self.ray_f64(film);
+        if let Some(lens) = &self.lens {
+            let on_lens = concentric_disk(on_lens.map(f64::from));
+            (origin, direction) = self.through_lens(lens, (origin, direction), on_lens);
+        }
         if let Some(bounds) = &self.start {
-            let (enter, _) = bounds.clip(origin, direction)?;
+            let Some((enter, _)) = bounds.clip(origin, direction) else {
+                let ray = Ray::new(origin.as_vec3(), direction.as_vec3());
+                return self.keeps_all.then_some(Ray { t_max: 0.0, ..ray });
+            };
             origin += direction * enter.max(0.0);
         }
         Some(Ray::new(origin.as_vec3(), direction.as_vec3()))
@@ -212,7 +268,7 @@ mod tests {
     #[test]
     fn corners_of_the_picture_are_where_the_field_of_view_says() {
         let projection = Projection::Perspective { fov: 90f64.to_radians() };
-        let camera = Camera::new(pose(), projection, [200, 100], UNIT);
+        let camera = Camera::new(pose(), projection, None, [200, 100], UNIT);
         let (origin, d) = camera.ray_f64(DVec2::new(200.0, 0.0));
         assert_eq!(origin, DVec3::new(0.0, 0.0, 5.0));
         // Upper right: 45° up, twice that to the right.
@@ -222,7 +278,7 @@ mod tests {
     #[test]
     fn parallel_rays_are_parallel() {
         let projection = Projection::Orthographic { height: 4.0 };
-        let camera = Camera::new(pose(), projection, [200, 100], UNIT);
+        let camera = Camera::new(pose(), projection, None, [200, 100], UNIT);
         let (a, d) = camera.ray_f64(DVec2::new(0.0, 100.0));
         let (b, e) = camera.ray_f64(DVec2::new(200.0, 0.0));
         assert_eq!((d, e), (DVec3::NEG_Z, DVec3::NEG_Z));
@@ -230,20 +286,40 @@ mod tests {
     }
 
     #[test]
+    fn rays_through_a_lens_meet_in_the_plane_of_focus() {
+        for projection in
+            [Projection::Perspective { fov: 1.0 }, Projection::Orthographic { height: 3.0 }]
+        {
+            let lens = Lens { radius: 0.3, focus_distance: 4.0 };
+            let film = DVec2::new(150.0, 20.0);
+            let camera = |lens| Camera::new(pose(), projection, lens, [200, 100], UNIT);
+            let (o, d) = camera(None).ray_f64(film);
+            let focus = o + d * (4.0 / -d.z);
+            let camera = camera(Some(lens));
+            for on_lens in [[0.5, 0.5], [0.0, 0.3], [0.9, 0.99]] {
+                let ray = camera.ray(film, on_lens).unwrap();
+                let across = (ray.origin.as_dvec3() - o).length();
+                let off = (focus - ray.origin.as_dvec3()).cross(ray.direction.as_dvec3()).length();
+                assert!(across <= 0.3 + 1e-6 && (ray.origin.z - 5.0).abs() < 1e-6 && off < 1e-6);
+            }
+        }
+    }
+
+    #[test]
     fn a_far_camera_starts_its_rays_at_the_box() {
         let eye = DVec3::new(1e7, 2e7, -3e7);
         let pose = Pose::look_at(eye, DVec3::ZERO, DVec3::Y).unwrap();
         let fov = 2.5 / eye.length();
-        let camera = Camera::new(pose, Projection::Perspective { fov }, [1000, 1000], UNIT);
+        let camera = Camera::new(pose, Projection::Perspective { fov }, None, [1000, 1000], UNIT);
         for i in 1..10 {
             let film = DVec2::new(400.0 + 20.0 * f64::from(i), 450.0);
-            let ray = camera.ray(film).unwrap();
+            let ray = camera.ray(film, [0.5; 2]).unwrap();
             let (o, d) = camera.ray_f64(film);
             // Distance of the f32 ray's origin from the f64 line.
             let off = (ray.origin.as_dvec3() - o).cross(d).length();
             assert!(ray.origin.length() < 4.0 && off < 3e-7, "{off}");
         }
-        assert!(camera.ray(DVec2::new(-5000.0, 0.0)).is_none());
+        assert!(camera.ray(DVec2::new(-5000.0, 0.0), [0.5; 2]).is_none());
     }
 
     #[test]

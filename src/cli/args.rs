@@ -66,9 +66,14 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub(super) samples: Option<u32>,
 
-    /// Algorithm: `flat` shows colours without light, `direct` local illumination with shadows
+    /// Algorithm: `whitted` traces mirrors and glass, `direct` is local illumination with shadows, `flat`
+    /// shows colours without light, `ao` how open each place lies
     #[arg(long, value_name = "NAME", value_parser = by_name(&IntegratorKind::ALL, IntegratorKind::name))]
     pub(super) integrator: Option<IntegratorKind>,
+
+    /// Bounces of mirrored and refracted rays; 0 is the camera ray and its direct light
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1 << 20))]
+    pub(super) max_depth: Option<u32>,
 
     /// How exact ray queries are: `fast` loses some rays at edges and far from the origin, `robust` only a
     /// few that meet a vertex exactly

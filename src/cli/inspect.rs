@@ -6,7 +6,7 @@ use super::args::InspectArgs;
 use super::report::peak_bytes;
 use super::units::{grouped, megabytes};
 use super::{Failure, Outcome, job, print};
-use crate::scene::Scene;
+use crate::scene::{IntegratorKind, Scene};
 
 /// Loads and builds the scene, and prints what it finds.
 pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
@@ -49,17 +49,17 @@ fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
         1 => Some(format!("1 {one}")),
         n => Some(format!("{} {many}", grouped(n))),
     };
-    let joined = |parts: [Option<String>; 4]| {
-        let parts: Vec<String> = parts.into_iter().flatten().collect();
+    let joined = |parts: &[Option<String>]| {
+        let parts: Vec<String> = parts.iter().flatten().cloned().collect();
         if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") }
     };
     fact(
         "geometry",
-        joined([
+        joined(&[
             counted(r.triangles, "triangle", "triangles"),
             counted(r.smooth_meshes, "mesh with shading normals", "meshes with shading normals"),
             counted(r.spheres, "sphere", "spheres"),
-            None,
+            counted(r.disks, "disk", "disks"),
         ]),
     );
     if r.copies > 0 {
@@ -87,7 +87,7 @@ fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
         if r.lit_automatically {
             "none: lit from the camera's side".to_owned()
         } else {
-            joined([
+            joined(&[
                 counted(r.point_lights, "point light", "point lights"),
                 counted(
                     r.lecture_lights,
@@ -95,25 +95,18 @@ fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
                     "point lights without falloff",
                 ),
                 counted(r.directional_lights, "directional light", "directional lights"),
+                counted(r.spot_lights, "spot light", "spot lights"),
+                counted(r.area_lights, "area light", "area lights"),
                 (!scene.ambient.is_black()).then(|| "ambient light".to_owned()),
             ])
         },
     );
+    let needed = requirements(scene);
+    fact("requires", needed.first().cloned().unwrap_or_default());
+    for line in needed.into_iter().skip(1) {
+        fact("", line);
+    }
     let s = &scene.settings;
-    let mut required = vec![format!("integrator `{}`", s.integrator.name())];
-    if r.shadow_rays {
-        required.push("shadow rays, as there are lights".to_owned());
-    }
-    if r.specular_materials > 0 {
-        required.push("highlights, as there are specular materials".to_owned());
-    }
-    if r.spheres > 0 {
-        required.push("user geometry, as there are spheres".to_owned());
-    }
-    if r.copies > 0 {
-        required.push("a second level, as there are instances".to_owned());
-    }
-    fact("requires", required.join("; "));
     fact(
         "picture",
         format!(
@@ -126,4 +119,39 @@ fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
     );
     fact("hash", format!("{hash:016x}"));
     facts
+}
+
+/// What the scene needs and why, a line each: first the code that is run for it.
+fn requirements(scene: &Scene) -> Vec<String> {
+    let r = &scene.requirements;
+    let s = &scene.settings;
+    let is_tree = s.integrator == IntegratorKind::Whitted;
+    let is_lit = is_tree || s.integrator == IntegratorKind::Direct;
+    let mut needed = vec![format!("integrator `{}`", s.integrator.name())];
+    if is_lit {
+        needed[0] += &format!(", compiled for `{}`", r.variant.name());
+    }
+    let mut need = |is_there: bool, what: &str| {
+        if is_there {
+            needed.push(what.to_owned());
+        }
+    };
+    need(r.shadow_rays, "shadow rays, as there are lights");
+    need(is_lit && r.specular_materials > 0, "highlights, as there are specular materials");
+    need(is_tree && r.mirrors > 0, "mirrored rays, as there are materials that mirror");
+    need(is_tree && r.dielectrics > 0, "refracted rays, as there is glass");
+    need(is_tree && r.dispersive > 0, "single wavelengths, as there is glass that disperses");
+    need(r.transparent_shadows, "shadow rays through glass, as `shadows` asks for it");
+    need(r.textured_materials > 0, "textures, as materials have them");
+    need(is_lit && r.area_lights > 0, "points on lights drawn at random, as some have an area");
+    need(
+        is_lit && r.picks_lights,
+        "lights drawn from a tree, as there are more than `light_samples`",
+    );
+    need(is_lit && r.glows, "light of surfaces that are seen, as some glow");
+    need(is_lit && r.fog, "transmittances of fog, as there is a `[medium]`");
+    need(r.lens, "points on a lens drawn at random, as the camera has one");
+    need(r.spheres + r.disks > 0, "user geometry, as there are spheres or disks");
+    need(r.copies > 0, "a second level, as there are instances");
+    needed
 }

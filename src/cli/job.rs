@@ -62,7 +62,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     let scene = pool.install(|| build(&args.scene, loaded))?;
     phases.build = clock.elapsed().as_secs_f64();
 
-    let job = RenderJob { crop, seed: args.seed };
+    let job = RenderJob { crop, seed: args.seed, variant: None };
     let clock = Instant::now();
     let progress = Progress::new(quiet, "render");
     let rendered = pool.install(|| run_render(&scene, &job, &progress));
@@ -125,6 +125,7 @@ pub(super) fn load(args: &SceneArgs) -> Result<LoadedScene, Failure> {
     let settings = &mut scene.settings;
     scene.image.size = args.size.unwrap_or(scene.image.size);
     settings.samples = args.samples.unwrap_or(settings.samples);
+    settings.max_depth = args.max_depth.unwrap_or(settings.max_depth);
     settings.integrator = args.integrator.unwrap_or(settings.integrator);
     settings.precision = args.precision.unwrap_or(settings.precision);
     settings.build_quality = args.build_quality.unwrap_or(settings.build_quality);

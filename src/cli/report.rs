@@ -9,13 +9,15 @@ use super::{Failure, job::Phases, print};
 use crate::accel::AccelInfo;
 use crate::io::{Attribute, AttributeValue};
 use crate::render::{RenderJob, Rendered};
-use crate::scene::{Epsilon, Scene};
+use crate::scene::{Epsilon, IntegratorKind, Scene};
 
 /// The fields of `--stats`; their names are stable.
 #[derive(Debug, Serialize)]
 struct Stats<'a> {
     seconds: &'a Phases,
     rays: Rays,
+    /// Where branches of the ray tree ended.
+    ends: Branches,
     memory: Memory,
     samples: u32,
     /// Estimated relative sampling error; null at one sample a pixel.
@@ -35,6 +37,16 @@ struct Rays {
     diffuse: u64,
 }
 
+/// Branches of the ray tree by the rule that ended them.
+#[derive(Debug, Serialize)]
+struct Branches {
+    miss: u64,
+    diffuse: u64,
+    depth: u64,
+    prune: u64,
+    roulette: u64,
+}
+
 #[derive(Debug, Serialize)]
 struct Memory {
     peak_bytes: u64,
@@ -48,14 +60,22 @@ pub(super) fn write_stats(
     rendered: &Rendered,
     accel: &AccelInfo,
 ) -> Result<(), Failure> {
+    let ends = rendered.rays.ends;
     let stats = Stats {
         seconds: phases,
         rays: Rays {
             camera: rendered.rays.camera,
             shadow: rendered.rays.shadow,
-            reflection: 0,
-            refraction: 0,
-            diffuse: 0,
+            reflection: rendered.rays.reflection,
+            refraction: rendered.rays.refraction,
+            diffuse: rendered.rays.diffuse,
+        },
+        ends: Branches {
+            miss: ends.miss,
+            diffuse: ends.diffuse,
+            depth: ends.depth,
+            prune: ends.prune,
+            roulette: ends.roulette,
         },
         memory: Memory { peak_bytes: peak_bytes(), accelerator_bytes: accel.bytes },
         samples: rendered.samples,
@@ -83,15 +103,27 @@ pub(super) fn print_table(phases: &Phases, rendered: &Rendered, accel: &AccelInf
         ),
     );
     let rays = rendered.rays;
-    line(
-        "rays",
-        format!(
-            "{} camera, {} shadow: {:.1} Mrays/s",
-            grouped(rays.camera),
-            grouped(rays.shadow),
-            rays.total() as f64 / phases.render.max(1e-9) / 1e6
-        ),
-    );
+    let kinds = [
+        (rays.camera, "camera"),
+        (rays.shadow, "shadow"),
+        (rays.reflection, "reflection"),
+        (rays.refraction, "refraction"),
+        (rays.diffuse, "ambient"),
+    ];
+    let speed = rays.total() as f64 / phases.render.max(1e-9) / 1e6;
+    line("rays", format!("{}: {speed:.1} Mrays/s", listed(&kinds)));
+    // Only a ray tree has branches.
+    if rays.reflection + rays.refraction + rays.ends.depth > 0 {
+        let ends = rays.ends;
+        let rules = [
+            (ends.miss, "met nothing"),
+            (ends.diffuse, "met a surface that sends no rays on"),
+            (ends.depth, "at max_depth"),
+            (ends.prune, "by prune"),
+            (ends.roulette, "by roulette"),
+        ];
+        line("branches", format!("ended: {}", listed(&rules)));
+    }
     line(
         "memory",
         format!("{} at most, of it {} in {accel}", megabytes(peak_bytes()), megabytes(accel.bytes)),
@@ -105,6 +137,13 @@ pub(super) fn print_table(phases: &Phases, rendered: &Rendered, accel: &AccelInf
             None => "unknown: one sample a pixel gives no estimate".to_owned(),
         },
     );
+}
+
+/// "3 camera, 1 shadow": what there is none of is left out.
+fn listed(counts: &[(u64, &str)]) -> String {
+    let there = counts.iter().filter(|(n, _)| *n > 0);
+    let parts: Vec<String> = there.map(|(n, name)| format!("{} {name}", grouped(*n))).collect();
+    if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
 }
 
 fn plural(n: u32, what: &str) -> String {
@@ -153,12 +192,23 @@ pub(super) fn attributes(
 
 /// The options that shift the picture systematically, which the stated error does not cover.
 fn biasing_options(scene: &Scene) -> String {
-    let mut list = vec![format!("precision={}", scene.settings.precision.name())];
-    if let Epsilon::Fixed(epsilon) = scene.settings.epsilon {
+    let settings = &scene.settings;
+    let mut list = vec![format!("precision={}", settings.precision.name())];
+    if let Epsilon::Fixed(epsilon) = settings.epsilon {
         list.push(format!("epsilon={epsilon}"));
     }
-    if !scene.settings.shadows {
+    if !settings.shadows.are_cast() {
         list.push("shadows=false".to_owned());
+    }
+    let r = &scene.requirements;
+    if settings.integrator == IntegratorKind::Whitted && r.mirrors + r.dielectrics > 0 {
+        list.push(format!("max_depth={}", settings.max_depth));
+        if settings.prune > 0.0 && !settings.roulette {
+            list.push(format!("prune={}", settings.prune));
+        }
+    }
+    if r.dielectrics > 0 && r.shadow_rays {
+        list.push(format!("shadows={}", settings.shadows.name()));
     }
     list.join(" ")
 }

@@ -42,6 +42,26 @@ impl Rgb {
         0.2126 * self.r + 0.7152 * self.g + 0.0722 * self.b
     }
 
+    /// The largest component.
+    #[inline]
+    pub fn max_component(self) -> f32 {
+        self.r.max(self.g).max(self.b)
+    }
+
+    /// `f` of each component.
+    #[inline]
+    #[must_use]
+    pub fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        Self::new(f(self.r), f(self.g), f(self.b))
+    }
+
+    /// `f` of each component and its counterpart.
+    #[inline]
+    #[must_use]
+    pub fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self::new(f(self.r, other.r), f(self.g, other.g), f(self.b, other.b))
+    }
+
     /// Whether no component is NaN or infinite.
     #[inline]
     pub fn is_finite(self) -> bool {
@@ -89,6 +109,13 @@ impl Mul<f32> for Rgb {
     #[inline]
     fn mul(self, k: f32) -> Self {
         Self::new(self.r * k, self.g * k, self.b * k)
+    }
+}
+
+impl MulAssign for Rgb {
+    #[inline]
+    fn mul_assign(&mut self, o: Self) {
+        *self = *self * o;
     }
 }
 

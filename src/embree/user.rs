@@ -107,12 +107,23 @@ unsafe fn load(rays: *const f32, n: usize, lane: usize) -> Ray {
 pub(super) unsafe extern "C" fn intersect<G: UserGeometry>(
     args: *const sys::RTCIntersectFunctionNArguments,
 ) {
+    // SAFETY: the arguments are Embree's, for one callback; each width is the one that they name, and
+    // single rays, the most by far, get code of their own.
+    unsafe {
+        match (*args).N {
+            1 => intersect_lanes::<G>(&*args, 1),
+            n => intersect_lanes::<G>(&*args, n as usize),
+        }
+    }
+}
+
+/// # Safety
+/// `args` are Embree's for one callback of width `n`.
+#[inline(always)]
+unsafe fn intersect_lanes<G: UserGeometry>(args: &sys::RTCIntersectFunctionNArguments, n: usize) {
     // SAFETY: as in `bounds`; the query context is never null inside a callback.
-    let (args, shapes, query) = unsafe {
-        let args = &*args;
-        (args, &*(*args.geometryUserPtr.cast::<Context<G>>()).shapes, &*args.context)
-    };
-    let n = args.N as usize;
+    let (shapes, query) =
+        unsafe { (&*(*args.geometryUserPtr.cast::<Context<G>>()).shapes, &*args.context) };
     let rays = args.rayhit.cast::<f32>();
     for lane in 0..n {
         // SAFETY: `valid` holds n entries; `rayhit` is an RTCRayHitN of width n, exclusively ours.
@@ -148,11 +159,20 @@ pub(super) unsafe extern "C" fn occluded<G: UserGeometry>(
     args: *const sys::RTCOccludedFunctionNArguments,
 ) {
     // SAFETY: as in `intersect`.
-    let (args, shapes) = unsafe {
-        let args = &*args;
-        (args, &*(*args.geometryUserPtr.cast::<Context<G>>()).shapes)
-    };
-    let n = args.N as usize;
+    unsafe {
+        match (*args).N {
+            1 => occluded_lanes::<G>(&*args, 1),
+            n => occluded_lanes::<G>(&*args, n as usize),
+        }
+    }
+}
+
+/// # Safety
+/// `args` are Embree's for one callback of width `n`.
+#[inline(always)]
+unsafe fn occluded_lanes<G: UserGeometry>(args: &sys::RTCOccludedFunctionNArguments, n: usize) {
+    // SAFETY: as in `intersect_lanes`.
+    let shapes = unsafe { &*(*args.geometryUserPtr.cast::<Context<G>>()).shapes };
     let rays = args.ray.cast::<f32>();
     for lane in 0..n {
         // SAFETY: `valid` holds n entries; `ray` is an RTCRayN of width n, exclusively ours.

@@ -1,9 +1,9 @@
 //! The lecture's first picture: the colour of what is hit, and no light at all.
 
-use super::{Integrator, RayCounts};
-use crate::accel::{HitBlock, LANES, RayBlock, RayQuery};
+use super::{CameraBlock, Integrator, RayCounts};
+use crate::accel::{LANES, RayQuery};
 use crate::color::Rgb;
-use crate::scene::Scene;
+use crate::scene::{Cone, Scene};
 
 /// Shows the albedo of the first surface.
 #[derive(Debug, Clone, Copy)]
@@ -14,13 +14,21 @@ impl Integrator for Flat {
         &self,
         scene: &Scene,
         _query: &Q,
-        _rays: &RayBlock,
-        hits: &HitBlock,
+        camera: &CameraBlock<'_>,
         _counts: &mut RayCounts,
     ) -> [Rgb; LANES] {
-        std::array::from_fn(|lane| match hits.get(lane) {
-            Some(hit) => scene.material(hit).albedo(),
+        std::array::from_fn(|lane| match camera.hits.get(lane) {
             None => scene.background,
+            Some(hit) if !scene.has_maps() => scene.material(hit).albedo(),
+            Some(hit) => {
+                let ray = camera.rays.get(lane);
+                let mut point = scene.surface(&ray, hit);
+                let cone = scene.widened(Cone::of_pixel(scene, &ray), hit);
+                match scene.apply_maps(hit, cone.width, &mut point) {
+                    None => point.material.albedo(),
+                    Some(material) => material.albedo(),
+                }
+            }
         })
     }
 }

@@ -318,6 +318,30 @@ impl<'d, 'r> Fields<'d, 'r> {
         None
     }
 
+    /// A whole number within bounds that may be negative.
+    pub(super) fn signed(&self, name: &'static str, min: i32, max: i32) -> Option<i32> {
+        let node = self.get(name)?;
+        if let Value::Integer(i) = node.value
+            && let Ok(i) = i32::try_from(i)
+            && (min..=max).contains(&i)
+        {
+            return Some(i);
+        }
+        self.reader.expected(node, name, &format!("a whole number from {min} to {max}"));
+        None
+    }
+
+    /// A number in [0, 1].
+    pub(super) fn fraction(&self, name: &'static str) -> Option<f64> {
+        let node = self.get(name)?;
+        let x = self.reader.number(node, name)?;
+        if (0.0..=1.0).contains(&x) {
+            return Some(x);
+        }
+        self.reader.expected(node, name, "a number from 0 to 1");
+        None
+    }
+
     pub(super) fn text(&self, node: &'d Node, name: &str) -> Option<&'d str> {
         match &node.value {
             Value::String(text) => Some(text),

@@ -18,7 +18,7 @@ use crate::color::linear_from_srgb;
 use crate::texture::{ImageData, Pixels};
 
 /// What the numbers of a picture file mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ColorSpace {
     /// sRGB signals, as pictures of 8 and 16 bits mostly have.
     Srgb,
@@ -71,6 +71,17 @@ pub fn read_image(path: &Path, space: Option<ColorSpace>) -> Result<ImageFile, R
     source.read_at(&mut start[..known], 0)?;
     kind(path, &start)?;
     decode(path, &source.read_from(0)?, space)
+}
+
+/// What every PNG file begins with.
+pub(super) const PNG_SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+
+/// The numbers of a PNG file as they are, 0 to 1, sRGB signals though they be.
+pub(super) fn decode_png(path: &Path, bytes: &[u8]) -> Result<ImageData, ReadError> {
+    let file = File { path, bytes };
+    let Decoded { size, channels, pixels, .. } = png::decode(&file, ColorSpace::Linear)?;
+    ImageData::new(size.map(|n| n as u32), channels, pixels)
+        .ok_or_else(|| file.wrong("its pixels are fewer or more than its size says"))
 }
 
 /// The decoder for a file that begins with `start`, and what its numbers usually mean.

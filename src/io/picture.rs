@@ -4,14 +4,15 @@ use std::path::Path;
 
 use super::error::ReadError;
 use super::source::Source;
-use super::{exr_read, png_read};
+use super::{exr_read, image};
+use crate::color::linear_from_srgb;
 use crate::film::Picture;
 
 /// Most pixels of a picture that is read: a file of some kilobytes may truly hold more, all black.
 const MOST_PIXELS: u64 = 1 << 28;
 
 /// Reads an EXR or a PNG file, whichever its first bytes say it is, as [`super::read_exr`] and
-/// [`super::read_png`] do.
+/// [`read_png`] do.
 ///
 /// # Errors
 /// [`ReadError`] where it cannot be read, is neither, or is not sound.
@@ -19,11 +20,31 @@ pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
     let bytes = Source::open(path)?.read_from(0)?;
     if bytes.starts_with(&exr_read::SIGNATURE) {
         exr_read::decode(path, &bytes)
-    } else if bytes.starts_with(&png_read::SIGNATURE) {
-        png_read::decode(path, &bytes)
+    } else if bytes.starts_with(&image::PNG_SIGNATURE) {
+        decode_png(path, &bytes)
     } else {
         Err(ReadError::file(path, "unknown kind of picture; accepted: EXR, PNG"))
     }
+}
+
+/// Reads a PNG file of 1 to 16 bits a channel, in grey, colour or with a palette. Its values are taken as
+/// sRGB, whatever the file says of its gamma; alpha is left out, and of an animation all but the first
+/// picture.
+///
+/// # Errors
+/// [`ReadError`] where the file cannot be read, or is not a sound PNG file.
+pub fn read_png(path: &Path) -> Result<Picture, ReadError> {
+    decode_png(path, &Source::open(path)?.read_from(0)?)
+}
+
+fn decode_png(path: &Path, bytes: &[u8]) -> Result<Picture, ReadError> {
+    // As numbers first, which keeps all 16 bits of those that have them.
+    let image = image::decode_png(path, bytes)?;
+    let size = image.size();
+    let [width, height] = size.map(|n| n as usize);
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let pixels = pixels.map(|(x, y)| image.texel(x, y).map(linear_from_srgb)).collect();
+    Ok(Picture { size, extent: size, origin: None, pixels })
 }
 
 /// Refuses pictures that are empty or beyond [`MOST_PIXELS`], and those whose `packed` bytes cannot hold

@@ -98,6 +98,12 @@ fn hash(scene: &SceneDesc, text: &str, options: &LoadOptions) -> u64 {
             }
         }
     }
+    // Pictures, in the order of the materials that name them; the text says the rest.
+    for image in scene.materials.iter().flat_map(|m| m.maps.images()) {
+        let picture = &image.levels()[0];
+        total.update(bytemuck::cast_slice(&picture.size()));
+        total.update(picture.pixels().as_bytes());
+    }
     for mesh in &scene.meshes {
         let mut add = |bytes: &[u8]| {
             let parts: Vec<u64> = bytes.par_chunks(PART).map(xxh3_64).collect();

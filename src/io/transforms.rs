@@ -49,11 +49,11 @@ pub(super) fn read_transforms(path: &Path) -> Result<Vec<DAffine3>, ReadError> {
 }
 
 /// A list of steps, applied in the order written.
-pub(super) fn transform(reader: &Reader<'_>, node: &Node) -> Option<DAffine3> {
+pub(super) fn transform(reader: &Reader<'_>, node: &Node, name: &str) -> Option<DAffine3> {
     let Value::Array(steps) = &node.value else {
         reader.expected(
             node,
-            "transform",
+            name,
             "a list of steps: { scale = … }, { rotate = … }, { translate = … }, { matrix = … }",
         );
         return None;

@@ -47,21 +47,3 @@ pub(super) fn aim(p: DVec3, target: DVec3, short: f64, irradiance: Rgb) -> Optio
 pub(super) fn lift(size: f64, reach: f64, n: DVec3) -> f64 {
     (f64::from(gamma(8)) * size + f64::from(gamma(16)) * reach) * n.abs().element_sum()
 }
-
-/// From the unit square to the unit disk, by concentric rings: neighbours stay neighbours, and equal
-/// areas stay equal. Source: Shirley, Chiu, *A Low Distortion Map Between Disk and Square*, JGT 2(3) 1997.
-#[inline]
-pub(super) fn concentric([u, v]: [f64; 2]) -> [f64; 2] {
-    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
-    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
-    if a == 0.0 && b == 0.0 {
-        return [0.0, 0.0];
-    }
-    let (r, phi) = if a.abs() > b.abs() {
-        (a, FRAC_PI_4 * (b / a))
-    } else {
-        (b, FRAC_PI_2 - FRAC_PI_4 * (a / b))
-    };
-    let (sin, cos) = phi.sin_cos();
-    [r * cos, r * sin]
-}

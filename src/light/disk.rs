@@ -3,10 +3,11 @@
 use glam::DVec3;
 
 use super::LightSample;
-use super::aim::{aim, concentric, lift, scaled};
+use super::aim::{aim, lift, scaled};
 use super::bounds::{Cone, LightBounds, strength};
 use crate::color::Rgb;
 use crate::math::Bounds;
+use crate::math::concentric_disk;
 
 /// A disk of constant radiance that shines to one side.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +41,7 @@ impl DiskLight {
             return None;
         }
         let (x, y) = n.any_orthonormal_pair();
-        let [s, t] = concentric(u);
+        let [s, t] = concentric_disk(u).to_array();
         let offset = (x * s + y * t) * self.radius;
         let target = self.center + offset;
         let d = target.distance(p);

@@ -5,10 +5,11 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::LightSample;
-use super::aim::{aim, concentric, lift, scaled};
+use super::aim::{aim, lift, scaled};
 use super::bounds::{Cone, LightBounds, strength};
 use crate::color::Rgb;
 use crate::math::Bounds;
+use crate::math::concentric_disk;
 
 /// A sphere of constant radiance that shines outward. There is no light from it inside.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +51,7 @@ impl SphereLight {
         let cap = sin2_max / (1.0 + cos_max);
 
         // Squared distances from the centre of the unit disk are uniform in [0, 1).
-        let [a, b] = concentric(u);
+        let [a, b] = concentric_disk(u).to_array();
         let v = a * a + b * b;
         let (cos_phi, sin_phi) = if v > 0.0 { (a / v.sqrt(), b / v.sqrt()) } else { (1.0, 0.0) };
         let below = cap * v;

@@ -7,7 +7,7 @@
 //! Total reflection, the direction and the reflectance all come from one root, taken once in
 //! [`refract`]: where there is a refracted ray there is a reflectance, and both agree.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::color::Rgb;
 
@@ -43,8 +43,7 @@ pub struct Refraction {
 /// grazing angles nor with eta near 1, where 1 − sin²θt loses its digits.
 #[inline]
 pub fn refract(d: Vec3, n: Vec3, eta: f32) -> Option<Refraction> {
-    let (d, n) = (d.as_dvec3(), n.as_dvec3());
-    let (d, mut n) = (d / d.length(), n / n.length());
+    let (d, mut n) = (normalized(d.as_dvec3()), normalized(n.as_dvec3()));
     let mut cos_i = -d.dot(n);
     if cos_i < 0.0 {
         (cos_i, n) = (-cos_i, -n);
@@ -56,14 +55,23 @@ pub fn refract(d: Vec3, n: Vec3, eta: f32) -> Option<Refraction> {
     if !(under_root >= 0.0) {
         return None;
     }
-    let cos_t = (under_root.sqrt() / e).min(1.0);
-    let direction = (d + n * cos_i) / e - n * cos_t;
+    let per_e = 1.0 / e;
+    let cos_t = (under_root.sqrt() * per_e).min(1.0);
+    let direction = (d + n * cos_i) * per_e - n * cos_t;
     Some(Refraction {
         direction: direction.as_vec3(),
         cos_i: cos_i as f32,
         cos_t: cos_t as f32,
         eta,
     })
+}
+
+/// The direction of a vector. What is of unit length up to the rounding of f32 takes neither root nor
+/// division: three terms of the series of 1/√(1 + off) have an error of 5/16·off³, below 10⁻¹⁸.
+#[inline]
+fn normalized(v: DVec3) -> DVec3 {
+    let off = v.length_squared() - 1.0;
+    if off.abs() < 1e-6 { v * (1.0 - off * (0.5 - 0.375 * off)) } else { v / v.length() }
 }
 
 impl Refraction {

@@ -3,15 +3,19 @@
 pub mod fresnel;
 mod ior;
 mod metals;
+mod phong;
+mod specular;
 
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
-use crate::color::Rgb;
-
 pub use ior::{GLASSES, Ior, LINE_C, LINE_D, LINE_E, LINE_F, LINE_G, glass};
 pub use metals::{METALS, Metal, metal};
+pub use phong::{Phong, PhongModel};
+pub use specular::{Conductor, Dielectric, FresnelModel, FresnelPower, MirrorFresnel};
+
+use crate::color::Rgb;
 
 /// How a surface scatters light.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,36 +27,17 @@ pub enum Material {
     },
     /// The lecture's shading equation.
     Phong(Phong),
-}
-
-/// Ambient, diffuse and specular coefficients of the lecture's shading equation:
-///
-/// I = k_a·I_a + Σ_lights (k_d·(n·l) + k_s·cosⁿα)·I
-///
-/// Empirical: it is neither reciprocal nor bounded in energy.
-/// Source: Phong, *Illumination for Computer Generated Pictures*, CACM 18(6) 1975; Blinn, SIGGRAPH 1977.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Phong {
-    /// k_a.
-    pub ambient: Rgb,
-    /// k_d.
-    pub diffuse: Rgb,
-    /// k_s.
-    pub specular: Rgb,
-    /// n, the sharpness of the highlight, ≥ 0.
-    pub shininess: f32,
-    /// What the highlight's angle α is measured between.
-    pub model: PhongModel,
-}
-
-/// The two ways to measure a highlight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum PhongModel {
-    /// cos α = n·h, h half-way between light and viewer (Blinn).
-    #[default]
-    BlinnPhong,
-    /// cos α = r·v, r the mirrored direction of the light (Phong).
-    Phong,
+    /// A perfect mirror.
+    Mirror {
+        /// Fraction of light that is reflected, in [0, 1].
+        reflectance: Rgb,
+        /// How that depends on the angle; not at all where not given.
+        fresnel: Option<MirrorFresnel>,
+    },
+    /// A smooth metal.
+    Conductor(Conductor),
+    /// Smooth glass.
+    Dielectric(Dielectric),
 }
 
 impl Material {
@@ -70,34 +55,62 @@ impl Material {
         }
         match self {
             Self::Diffuse { reflectance } => *reflectance * (cos_theta * FRAC_1_PI),
-            Self::Phong(phong) => {
-                let diffuse = phong.diffuse * cos_theta;
-                if phong.specular.is_black() {
-                    return diffuse * FRAC_1_PI;
-                }
-                let cos_alpha = match phong.model {
-                    PhongModel::BlinnPhong => n.dot((wi + wo).normalize_or_zero()),
-                    PhongModel::Phong => (n * (2.0 * cos_theta) - wi).dot(wo),
-                };
-                let highlight = cos_alpha.clamp(0.0, 1.0).powf(phong.shininess);
-                (diffuse + phong.specular * highlight) * FRAC_1_PI
-            }
+            Self::Phong(phong) => phong.response(n, wo, wi, cos_theta),
+            Self::Mirror { .. } | Self::Conductor(_) | Self::Dielectric(_) => Rgb::BLACK,
         }
     }
 
-    /// What ambient light of radiance 1 from everywhere leaves as.
+    /// What ambient light of radiance 1 from everywhere leaves as. Smooth surfaces show their
+    /// surroundings instead.
+    #[inline]
     pub fn ambient(&self) -> Rgb {
         match self {
             Self::Diffuse { reflectance } => *reflectance,
             Self::Phong(phong) => phong.ambient,
+            Self::Mirror { .. } | Self::Conductor(_) | Self::Dielectric(_) => Rgb::BLACK,
         }
     }
 
     /// The colour of the surface without light: what the `flat` integrator shows.
     pub fn albedo(&self) -> Rgb {
         match self {
-            Self::Diffuse { reflectance } => *reflectance,
+            Self::Diffuse { reflectance } | Self::Mirror { reflectance, .. } => *reflectance,
             Self::Phong(phong) => phong.diffuse,
+            Self::Conductor(metal) => metal.reflectance(1.0),
+            Self::Dielectric(_) => Rgb::splat(1.0),
+        }
+    }
+
+    /// The share of what the mirrored ray sees, at `cos_i` = n·v. Glass, which reflects by the media on
+    /// either side, is not asked.
+    #[inline]
+    pub fn mirrored(&self, cos_i: f32) -> Rgb {
+        let by_angle = |share: Rgb, fresnel: &Option<MirrorFresnel>| match fresnel {
+            None => share,
+            Some(fresnel) => share * fresnel.reflectance(cos_i),
+        };
+        match self {
+            Self::Diffuse { .. } | Self::Dielectric(_) => Rgb::BLACK,
+            Self::Phong(phong) if phong.mirror.is_black() => Rgb::BLACK,
+            Self::Phong(phong) => by_angle(phong.mirror, &phong.fresnel),
+            Self::Mirror { reflectance, fresnel } => by_angle(*reflectance, fresnel),
+            Self::Conductor(metal) => metal.reflectance(cos_i),
+        }
+    }
+
+    /// Whether lights and ambient light show on it, by [`Material::response`].
+    #[inline]
+    pub fn is_lit(&self) -> bool {
+        matches!(self, Self::Diffuse { .. } | Self::Phong(_))
+    }
+
+    /// Whether it sends rays on.
+    #[inline]
+    pub fn is_specular(&self) -> bool {
+        match self {
+            Self::Diffuse { .. } => false,
+            Self::Phong(phong) => !phong.mirror.is_black(),
+            Self::Mirror { .. } | Self::Conductor(_) | Self::Dielectric(_) => true,
         }
     }
 }
@@ -114,6 +127,7 @@ mod tests {
             specular: Rgb::splat(0.25),
             shininess: 8.0,
             model,
+            ..Phong::default()
         })
     }
 

@@ -7,7 +7,9 @@
 mod bounds;
 mod ray;
 mod rounding;
+mod warp;
 
 pub use bounds::Bounds;
 pub use ray::Ray;
 pub use rounding::{gamma, offset_ray_origin};
+pub use warp::{concentric_disk, cosine_hemisphere};

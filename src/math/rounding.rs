@@ -17,22 +17,14 @@ pub const fn gamma(n: u32) -> f32 {
 /// - `w`: direction of the new ray.
 ///
 /// The result lies on the side of `n` that `w` points to, outside the box of half-width `error`
-/// around `p`, and each coordinate is rounded away from the surface.
-/// Source: pbrt 4ed §6.8.6 (`OffsetRayOrigin`).
-#[inline]
+/// around `p`. Source: pbrt 4ed §6.8.6 (`OffsetRayOrigin`). Instead of rounding every coordinate away
+/// from the surface, the way is lengthened by what rounding may take back: half an ulp of each
+/// coordinate of the result, taken twice.
+#[inline(always)]
 pub fn offset_ray_origin(p: Vec3, error: f32, n: Vec3, w: Vec3) -> Vec3 {
-    let distance = error * n.abs().element_sum();
-    let offset = if w.dot(n) < 0.0 { -n * distance } else { n * distance };
-    let round_away = |p: f32, o: f32| {
-        if o > 0.0 {
-            (p + o).next_up()
-        } else if o < 0.0 {
-            (p + o).next_down()
-        } else {
-            p
-        }
-    };
-    Vec3::new(round_away(p.x, offset.x), round_away(p.y, offset.y), round_away(p.z, offset.z))
+    let rounding = f32::EPSILON * p.abs().max_element();
+    let distance = (error * (1.0 + 4.0 * f32::EPSILON) + rounding) * n.abs().element_sum();
+    p + n * distance.copysign(w.dot(n))
 }
 
 #[cfg(test)]

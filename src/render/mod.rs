@@ -10,9 +10,11 @@ use rayon::prelude::*;
 
 use crate::accel::{Accel, LANES, RayBlock, RayQuery};
 use crate::film::{BLOCK_LANES, BlockAccumulator, Film, FilterTable, PixelRect};
-use crate::integrator::{Direct, Flat, Integrator, RayCounts};
+use crate::integrator::{
+    Ao, CameraBlock, Everything, Flat, Integrator, Local, RayCounts, Tree, Whitted,
+};
 use crate::sampler::{Dimensions, REPLICATES, Sampler};
-use crate::scene::{IntegratorKind, Scene};
+use crate::scene::{IntegratorKind, Scene, Variant};
 
 /// Pixels of a tile's side: a multiple of the block's 4.
 const TILE: u32 = 32;
@@ -32,6 +34,9 @@ pub struct RenderJob {
     pub crop: Option<PixelRect>,
     /// Seed of all random numbers.
     pub seed: u64,
+    /// The variant of the ray tree, where it is not to be the least that the scene needs; a lesser one
+    /// leaves out what it does not know. For comparisons: the picture is the same from that one on.
+    pub variant: Option<Variant>,
 }
 
 /// Hears how a render goes, and ends it. Called from all threads.
@@ -78,14 +83,30 @@ pub struct NonFinite {
 /// instruction set alone, not on the number of threads or their order (but for surfaces that coincide
 /// in a hierarchy built at low quality).
 pub fn render(scene: &Scene, job: &RenderJob, observer: &dyn Observer) -> Rendered {
-    // Static dispatch from here on: four loops are compiled, one is run.
-    match (&scene.accel, scene.settings.integrator) {
+    // Static dispatch from here on: one loop of those that are compiled is run.
+    match &scene.accel {
         #[cfg(feature = "embree")]
-        (Accel::Embree(query), IntegratorKind::Flat) => run(scene, query, &Flat, job, observer),
-        #[cfg(feature = "embree")]
-        (Accel::Embree(query), IntegratorKind::Direct) => run(scene, query, &Direct, job, observer),
-        (Accel::Brute(query), IntegratorKind::Flat) => run(scene, query, &Flat, job, observer),
-        (Accel::Brute(query), IntegratorKind::Direct) => run(scene, query, &Direct, job, observer),
+        Accel::Embree(query) => choose(scene, query, job, observer),
+        Accel::Brute(query) => choose(scene, query, job, observer),
+    }
+}
+
+fn choose<Q: RayQuery>(
+    scene: &Scene,
+    query: &Q,
+    job: &RenderJob,
+    observer: &dyn Observer,
+) -> Rendered {
+    let depth = match scene.settings.integrator {
+        IntegratorKind::Flat => return run(scene, query, &Flat, job, observer),
+        IntegratorKind::Ao => return run(scene, query, &Ao, job, observer),
+        IntegratorKind::Direct => None,
+        IntegratorKind::Whitted => Some(scene.settings.max_depth),
+    };
+    match job.variant.unwrap_or(scene.requirements.variant) {
+        Variant::Local => run(scene, query, &Whitted::<Local>::new(depth), job, observer),
+        Variant::Tree => run(scene, query, &Whitted::<Tree>::new(depth), job, observer),
+        Variant::Everything => run(scene, query, &Whitted::<Everything>::new(depth), job, observer),
     }
 }
 
@@ -226,24 +247,25 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             if sample % STOP_EVERY == 0 && observer.stop() {
                 return false;
             }
+            let samplers = std::array::from_fn(|lane| Sampler::new(self.seed, pixel(lane), sample));
             let mut rays = RayBlock::empty();
             let mut weights = [1.0; LANES];
             for lane in (0..LANES).filter(|lane| inside >> lane & 1 == 1) {
                 let [x, y] = pixel(lane);
-                let sampler = Sampler::new(self.seed, [x, y], sample);
-                let [u, v, ..] = sampler.four(Dimensions::Camera);
+                let [u, v, lens_u, lens_v] = samplers[lane].four(Dimensions::Camera);
                 let position = self.filter.sample([u, v]);
                 weights[lane] = position.weight;
                 let [dx, dy] = position.offset.map(f64::from);
                 let film = DVec2::new(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy);
-                if let Some(ray) = self.scene.camera.ray(film) {
+                if let Some(ray) = self.scene.camera.ray(film, [lens_u, lens_v]) {
                     rays.set(lane, &ray);
                 }
             }
             output.rays.camera += u64::from(rays.active().count_ones());
             let hits = self.query.intersect_block(&rays);
+            let camera = CameraBlock { rays: &rays, hits: &hits, samplers: &samplers };
             let mut radiance =
-                self.integrator.shade(self.scene, self.query, &rays, &hits, &mut output.rays);
+                self.integrator.shade(self.scene, self.query, &camera, &mut output.rays);
             for (value, weight) in radiance.iter_mut().zip(weights) {
                 *value *= weight;
             }

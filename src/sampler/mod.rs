@@ -17,10 +17,18 @@ const SEQUENCE: u32 = 1 << 16;
 pub enum Dimensions {
     /// Position in the pixel (first two) and on the lens (last two).
     Camera,
+    /// Wavelength (the first).
+    Spectrum,
+    /// Whether a branch of the ray tree goes on (the first).
+    Roulette,
+    /// Position on a light (first two), or which light (the third).
+    Light,
+    /// A direction (first two).
+    Direction,
 }
 
 /// The numbers of one sample of one pixel.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sampler {
     /// Hash of seed, pixel and replicate.
     stream: u32,
@@ -39,10 +47,39 @@ impl Sampler {
         Self { stream: (hash >> 32) as u32, index: index % SEQUENCE }
     }
 
-    /// Four numbers in [0, 1) for one use, well distributed over the samples of a replicate.
+    /// Four numbers in [0, 1) for one use, well distributed over the samples of a replicate, the first two
+    /// best: together they fill the square evenly.
+    ///
+    /// Each use takes the first four Sobol dimensions, in an order and with a scramble of its own, as
+    /// later dimensions fill their squares less evenly (Burley's padding).
     #[inline]
     pub fn four(&self, dimensions: Dimensions) -> [f32; 4] {
-        sobol_burley::sample_4d(self.index, dimensions as u32, self.stream)
+        let stream = match dimensions {
+            Dimensions::Camera => self.stream,
+            other => self.branch(!(other as u32)).stream,
+        };
+        sobol_burley::sample_4d(self.index, 0, stream)
+    }
+
+    /// The sampler of one of several branches, independent of its siblings and of this one: a node of
+    /// the ray tree, a light of many.
+    #[inline]
+    #[must_use]
+    pub fn branch(&self, key: u32) -> Self {
+        let hash = mix(u64::from(self.stream) << 32 | u64::from(key.wrapping_add(1)));
+        Self { stream: (hash >> 32) as u32, index: self.index }
+    }
+
+    /// Sample `k` of `n` that one node draws at once: consecutive points of the same sequence, so the
+    /// samples of a pixel together are as well distributed as n times as many would be.
+    #[inline]
+    #[must_use]
+    pub fn split(&self, k: u32, n: u32) -> Self {
+        let index = u64::from(self.index) * u64::from(n) + u64::from(k);
+        let (block, index) = (index / u64::from(SEQUENCE), index % u64::from(SEQUENCE));
+        let stream =
+            if block == 0 { self.stream } else { self.branch(!(block as u32) ^ (1 << 29)).stream };
+        Self { stream, index: index as u32 }
     }
 }
 
@@ -70,6 +107,22 @@ mod tests {
             }
             assert_eq!(cells, [1; 64], "a (0, 6, 2)-net has one point in each cell");
         }
+    }
+
+    #[test]
+    fn splitting_a_sample_goes_on_in_its_sequence() {
+        let sampler = |i: u32| Sampler::new(5, [17, 3], REPLICATES * i).branch(7);
+        let mut cells = [0; 64];
+        for i in 0..16 {
+            for k in 0..4 {
+                let [x, y, ..] = sampler(i).split(k, 4).four(Dimensions::Light);
+                cells[(x * 8.0) as usize + 8 * (y * 8.0) as usize] += 1;
+            }
+        }
+        assert_eq!(cells, [1; 64]);
+        let last = Sampler::new(5, [17, 3], REPLICATES * (SEQUENCE - 1));
+        assert_ne!(last.split(0, 9), last.split(1, 9));
+        assert_ne!(last.branch(0), last.branch(1));
     }
 
     #[test]

@@ -3,19 +3,25 @@
 
 use std::collections::HashMap;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use super::desc::{
-    CameraDesc, LightDesc, Location, PlaceDesc, Reference, RenderSettings, SceneDesc,
+    CameraDesc, LensDesc, Location, MaterialDesc, PlaceDesc, Reference, RenderSettings, SceneDesc,
 };
-use super::place::{GeometryMaterials, Placed, place};
-use super::requirements::Requirements;
+use super::lights::{
+    Emission, add_surfaces, default_lights, glowing_objects, is_hidden, written_lights,
+};
+use super::maps::Maps;
+use super::place::{GeometryLooks, Look, Placed, place};
+use super::requirements::{Contents, Requirements};
+use super::surface::SurfacePoint;
 use crate::accel::{Accel, AccelError, AccelKind, BuildOptions, Hit, World};
-use crate::camera::{Camera, Pose, Projection};
+use crate::camera::{Camera, Lens, Pose, Projection};
 use crate::color::Rgb;
-use crate::light::{DirectionalLight, Light, PointLight};
+use crate::light::{Light, LightTree};
 use crate::material::Material;
 use crate::math::Bounds;
+use crate::medium::{Fog, FogProfile, Interior};
 
 /// Vertical field of view where none is given.
 const DEFAULT_FOV: f64 = 40.0;
@@ -33,6 +39,12 @@ pub struct Scene {
     pub camera: Camera,
     /// All lights.
     pub lights: Vec<Light>,
+    /// Where there are more than a point can ask: from which to draw those that matter to it.
+    pub light_tree: Option<LightTree>,
+    /// Fog around everything.
+    pub fog: Option<Fog>,
+    /// The media that the camera stands in.
+    pub camera_interior: Interior,
     /// How to render.
     pub settings: RenderSettings,
     /// What it requires of a renderer.
@@ -44,9 +56,14 @@ pub struct Scene {
     /// The structure that answers ray queries.
     pub accel: Accel,
     pub(super) world: World,
-    materials: Vec<Material>,
-    root_materials: Vec<GeometryMaterials>,
-    prototype_materials: Vec<Vec<GeometryMaterials>>,
+    pub(super) materials: Vec<Material>,
+    /// What each material gives off; none where none does.
+    emissions: Vec<Emission>,
+    /// Textures of each material; none where none has any.
+    pub(super) maps: Vec<Maps>,
+    pub(super) frames: Vec<DAffine3>,
+    root_looks: Vec<GeometryLooks>,
+    prototype_looks: Vec<Vec<GeometryLooks>>,
 }
 
 /// A name that stands for nothing.
@@ -81,18 +98,22 @@ pub enum SceneError {
         name: String,
     },
     /// A transform has a NaN or infinite number.
-    #[error("{at}: the transform of this object is not finite")]
+    #[error("{at}: the {what} of this object is not finite")]
     TransformNotFinite {
         /// The object.
         at: Location,
+        /// Which of its fields.
+        what: &'static str,
     },
     /// A transform flattens space.
     #[error(
-        "{at}: the transform of this object is singular: it flattens the object to a plane, a line or a point"
+        "{at}: the {what} of this object is singular: it flattens the object to a plane, a line or a point"
     )]
     TransformSingular {
         /// The object.
         at: Location,
+        /// Which of its fields.
+        what: &'static str,
     },
     /// The scene reaches beyond what f32 ray queries can hold.
     #[error(
@@ -156,6 +177,40 @@ pub enum SceneError {
         /// The camera.
         at: Location,
     },
+    /// The place of a glass in the list of materials is part of what a ray remembers.
+    #[error("glass `{name}` is material {index} of the scene; at most {limit} may come before it")]
+    TooManyMaterials {
+        /// The material.
+        name: String,
+        /// Its number.
+        index: usize,
+        /// How many may come before.
+        limit: usize,
+    },
+    /// More triangles that glow than can be sampled.
+    #[error("objects with `emission` have more than {limit} triangles in all, copies counted each")]
+    TooManyGlowing {
+        /// The limit.
+        limit: u64,
+    },
+    /// An ellipsoid cannot be sampled as a light.
+    #[error(
+        "{at}: a sphere with `emission` must not be stretched more along one axis than along another; accepted: even scales, or a mesh"
+    )]
+    GlowingEllipsoid {
+        /// The object; that of a copy is not known.
+        at: Location,
+    },
+    /// A texture by texture coordinates lies on an object that has none.
+    #[error(
+        "{at}: the texture of material `{material}` needs texture coordinates, which this mesh does not have; accepted: a mesh with them, or a texture by position (for images `mapping` = \"planar\", \"spherical\" or \"cylindrical\")"
+    )]
+    NoTextureCoordinates {
+        /// The object.
+        at: Location,
+        /// The material.
+        material: String,
+    },
     /// The acceleration structure could not be built.
     #[error(transparent)]
     Accel(#[from] AccelError),
@@ -165,12 +220,12 @@ fn did_you_mean(name: &Option<String>) -> String {
     name.as_ref().map(|n| format!(" (did you mean `{n}`?)")).unwrap_or_default()
 }
 
-fn list(names: &[String]) -> String {
+fn list(names: &[&String]) -> String {
     if names.is_empty() {
         return "none is defined".to_owned();
     }
     const SHOWN: usize = 12;
-    let mut text = names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    let mut text = names.iter().take(SHOWN).map(|n| n.as_str()).collect::<Vec<_>>().join(", ");
     if names.len() > SHOWN {
         text += &format!(" and {} more", names.len() - SHOWN);
     }
@@ -185,10 +240,14 @@ pub(super) struct NameIndex {
 }
 
 impl NameIndex {
-    fn new(names: impl IntoIterator<Item = String>) -> Self {
+    pub(super) fn new(names: impl IntoIterator<Item = String>) -> Self {
         let names: Vec<String> = names.into_iter().collect();
         let indices = (0u32..).zip(&names).map(|(i, n)| (n.clone(), i)).collect();
         Self { indices, names }
+    }
+
+    pub(super) fn name(&self, index: u32) -> &str {
+        &self.names[index as usize]
     }
 
     pub(super) fn find(
@@ -198,13 +257,14 @@ impl NameIndex {
     ) -> Result<u32, SceneError> {
         self.indices.get(&reference.name).copied().ok_or_else(|| {
             let distance = |name: &&String| strsim::damerau_levenshtein(name, &reference.name);
-            let similar = self.names.iter().min_by_key(distance).filter(|n| distance(n) <= 2);
+            let named: Vec<&String> = self.names.iter().filter(|name| !is_hidden(name)).collect();
+            let similar = named.iter().copied().min_by_key(distance).filter(|n| distance(n) <= 2);
             SceneError::UnknownName(Box::new(UnknownName {
                 at: reference.at.clone(),
                 kind,
                 name: reference.name.clone(),
                 similar: similar.cloned(),
-                accepted: list(&self.names),
+                accepted: list(&named),
             }))
         })
     }
@@ -222,6 +282,7 @@ impl Scene {
         options: &BuildOptions,
         progress: &(dyn Fn(f64) -> bool + Sync),
     ) -> Result<Self, Vec<SceneError>> {
+        add_surfaces(&mut desc);
         let material_names = NameIndex::new(desc.materials.iter().map(|m| m.name.clone()));
         let prototype_names = NameIndex::new(desc.prototypes.iter().map(|p| p.name.clone()));
         let mut errors = Vec::new();
@@ -232,7 +293,16 @@ impl Scene {
             }),
             None => None,
         };
-        let placed = match place(&mut desc, &material_names, &prototype_names) {
+        // Index 0 is the neutral default.
+        let mut maps = vec![Maps::default()];
+        maps.extend(desc.materials.iter().map(|material| material.maps.clone()));
+        errors.extend(check_materials(&desc));
+        let glows: Vec<bool> = [false]
+            .into_iter()
+            .chain(desc.materials.iter().map(|m| !m.emission.is_black()))
+            .collect();
+        let placed = place(&mut desc, &material_names, &prototype_names, &maps, &glows);
+        let placed = match placed {
             Ok(placed) if errors.is_empty() => placed,
             Ok(_) => return Err(errors),
             Err(more) => {
@@ -240,7 +310,16 @@ impl Scene {
                 return Err(errors);
             }
         };
-        let Placed { world, root_materials, prototype_materials, center } = placed;
+
+        let mut emissions = vec![Emission::NONE];
+        emissions.extend(desc.materials.iter().map(Emission::of));
+        if emissions.iter().all(|e| e.radiance.is_black()) {
+            emissions.clear();
+        }
+        let glowing = glowing_objects(&placed, &emissions).map_err(|e| vec![e])?;
+        let has_own_light =
+            !desc.lights.is_empty() || desc.ambient.is_some() || !glowing.is_empty();
+        let Placed { world, root_looks, prototype_looks, frames, center } = placed;
 
         let bounds = world.bounds();
         let size = desc.image.size;
@@ -259,17 +338,43 @@ impl Scene {
                 pose
             }
         };
-        let camera = Camera::new(pose, projection, size, bounds);
+        let lens = desc.camera.as_ref().and_then(|camera| lens(camera, &pose, center, &bounds));
+        let mut camera = Camera::new(pose, projection, lens, size, bounds);
+        if desc.fog.is_some() {
+            camera.keep_all_rays();
+        }
 
         // A scene without light of its own is lit from the camera's side.
-        let unlit = desc.lights.is_empty() && desc.ambient.is_none();
-        let lights = if unlit { default_lights(&pose) } else { lights(&desc.lights, center) };
-        let ambient = desc.ambient.unwrap_or(Rgb::splat(if unlit { 0.15 } else { 0.0 }));
-        let default_background = if unlit { Rgb::splat(0.06) } else { Rgb::BLACK };
+        let lights = if has_own_light {
+            let mut lights = written_lights(&desc.lights, center);
+            lights.extend(glowing);
+            lights
+        } else {
+            default_lights(&pose)
+        };
+        let ambient = desc.ambient.unwrap_or(Rgb::splat(if has_own_light { 0.0 } else { 0.15 }));
+        let default_background = if has_own_light { Rgb::BLACK } else { Rgb::splat(0.06) };
+        let light_tree = Some(LightTree::new(&lights))
+            .filter(|tree| tree.len() > desc.settings.light_samples as usize);
 
         let mut materials = vec![Material::Diffuse { reflectance: Rgb::splat(0.6) }];
         materials.extend(desc.materials.into_iter().map(|m| m.material));
-        let requirements = Requirements::of(&world, &materials, &lights, &desc.settings, unlit);
+        if maps.iter().all(Maps::is_empty) {
+            maps.clear();
+        }
+        let fog = desc.fog.map(|fog| recentred(fog, center));
+        let requirements = Requirements::of(&Contents {
+            world: &world,
+            materials: &materials,
+            maps: &maps,
+            lights: &lights,
+            picks_lights: light_tree.is_some(),
+            glows: !emissions.is_empty(),
+            fog: fog.is_some(),
+            lens: lens.is_some(),
+            settings: &desc.settings,
+            lit_automatically: !has_own_light,
+        });
 
         let options = BuildOptions {
             precision: desc.settings.precision,
@@ -277,12 +382,15 @@ impl Scene {
             ..options.clone()
         };
         let accel = Accel::build(&world, &options, progress).map_err(|e| vec![e.into()])?;
-        Ok(Self {
+        let mut scene = Self {
             size,
             background: desc.image.background.unwrap_or(default_background),
             ambient,
             camera,
             lights,
+            light_tree,
+            fog,
+            camera_interior: Interior::OUTSIDE,
             settings: desc.settings,
             requirements,
             center,
@@ -290,9 +398,16 @@ impl Scene {
             accel,
             world,
             materials,
-            root_materials,
-            prototype_materials,
-        })
+            emissions,
+            maps,
+            frames,
+            root_looks,
+            prototype_looks,
+        };
+        if scene.requirements.dielectrics > 0 {
+            scene.camera_interior = scene.interior_at(scene.camera.pose().eye);
+        }
+        Ok(scene)
     }
 
     /// As [`Scene::build`] with the default structure and no progress: for tests and small programs.
@@ -303,16 +418,37 @@ impl Scene {
         Self::build(desc, &BuildOptions { kind, ..BuildOptions::default() }, &|_| true)
     }
 
+    /// The looks of what was hit.
+    #[inline]
+    pub(super) fn look(&self, hit: &Hit) -> Look {
+        let looks = match hit.copy {
+            None => &self.root_looks,
+            Some(copy) => {
+                &self.prototype_looks[self.world.sets[copy.set as usize].prototype as usize]
+            }
+        };
+        looks[hit.geometry as usize].of(hit.primitive)
+    }
+
     /// The material of what was hit.
     #[inline]
     pub fn material(&self, hit: &Hit) -> &Material {
-        let materials = match hit.copy {
-            None => &self.root_materials,
-            Some(copy) => {
-                &self.prototype_materials[self.world.sets[copy.set as usize].prototype as usize]
-            }
-        };
-        &self.materials[materials[hit.geometry as usize].of(hit.primitive) as usize]
+        &self.materials[self.look(hit).material as usize]
+    }
+
+    /// The radiance that a surface gives off towards the viewer.
+    #[inline]
+    pub fn emission(&self, point: &SurfacePoint<'_>) -> Rgb {
+        match self.emissions.get(point.material_index as usize) {
+            Some(emission) if point.is_front || emission.is_two_sided => emission.radiance,
+            _ => Rgb::BLACK,
+        }
+    }
+
+    /// Whether any material has textures.
+    #[inline]
+    pub fn has_maps(&self) -> bool {
+        !self.maps.is_empty()
     }
 
     /// What there is to hit.
@@ -330,29 +466,32 @@ fn camera_pose(camera: &CameraDesc) -> Result<Option<Pose>, SceneError> {
     pose.map(Some).ok_or_else(|| SceneError::Camera { at: camera.at.clone() })
 }
 
-fn lights(descs: &[LightDesc], center: DVec3) -> Vec<Light> {
-    let light = |desc: &LightDesc| match desc {
-        LightDesc::Point { position, intensity, falloff } => Light::Point(PointLight {
-            position: *position - center,
-            intensity: *intensity,
-            falloff: *falloff,
-        }),
-        LightDesc::Directional { direction, irradiance } => Light::Directional(DirectionalLight {
-            direction: direction.normalize().as_vec3(),
-            irradiance: *irradiance,
-        }),
+/// The lens of a camera, in focus at its target where nothing else is said; without a target, at the
+/// middle of the scene.
+fn lens(camera: &CameraDesc, pose: &Pose, center: DVec3, bounds: &Bounds) -> Option<Lens> {
+    let LensDesc { radius, focus_distance } = camera.lens?;
+    let along_view = |p: DVec3| (p - pose.eye).dot(pose.forward);
+    let default = match camera.place {
+        Some(PlaceDesc::LookAt { target, .. }) => along_view(target - center),
+        _ => along_view(bounds.center()),
     };
-    descs.iter().map(light).collect()
+    let default = if default > 0.0 { default } else { 1.0 };
+    Some(Lens { radius, focus_distance: focus_distance.unwrap_or(default) })
 }
 
-/// A key light over the camera's left shoulder and a weaker fill from its right.
-fn default_lights(pose: &Pose) -> Vec<Light> {
-    let towards = |right: f64, up: f64, forward: f64, irradiance: f32| {
-        let direction = pose.right * right + pose.up * up + pose.forward * forward;
-        Light::Directional(DirectionalLight {
-            direction: direction.normalize().as_vec3(),
-            irradiance: Rgb::splat(irradiance),
-        })
-    };
-    vec![towards(0.55, -0.75, 1.0, 2.6), towards(-0.9, -0.25, 0.6, 1.0)]
+/// Fog in the scene's own coordinates.
+fn recentred(mut fog: Fog, center: DVec3) -> Fog {
+    if let FogProfile::Height { base, .. } = &mut fog.profile {
+        *base -= center.y;
+    }
+    fog
+}
+
+/// Mistakes that only the list of materials as a whole shows.
+fn check_materials(desc: &SceneDesc) -> Option<SceneError> {
+    let limit = usize::from(u16::MAX) - 1;
+    let is_glass = |m: &MaterialDesc| matches!(m.material, Material::Dielectric(_));
+    let (index, last) = desc.materials.iter().enumerate().rfind(|(_, m)| is_glass(m))?;
+    let name = last.name.clone();
+    (index >= limit).then_some(SceneError::TooManyMaterials { name, index, limit })
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat4, DVec3};
 
+use super::maps::Maps;
 use crate::accel::{BuildQuality, Precision};
 use crate::camera::Projection;
 use crate::color::Rgb;
@@ -12,6 +13,7 @@ use crate::film::Filter;
 use crate::geometry::TriangleMesh;
 use crate::light::Falloff;
 use crate::material::Material;
+use crate::medium::Fog;
 
 /// Where something was written: `scene.toml:12:3`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,8 +74,11 @@ pub struct SceneDesc {
     pub objects: Vec<ObjectDesc>,
     /// What is only copied.
     pub prototypes: Vec<PrototypeDesc>,
-    /// Lights. Where there are none, and no ambient light either, a scene is lit from the camera's side.
+    /// Lights. Where there are none, nothing that glows and no ambient light either, a scene is lit from
+    /// the camera's side.
     pub lights: Vec<LightDesc>,
+    /// Fog around everything, with heights in world coordinates.
+    pub fog: Option<Fog>,
 }
 
 /// The picture.
@@ -101,6 +106,17 @@ pub struct CameraDesc {
     pub projection: Projection,
     /// Where it stands; framed automatically where not given.
     pub place: Option<PlaceDesc>,
+    /// A lens with depth of field; a pinhole where not given.
+    pub lens: Option<LensDesc>,
+}
+
+/// A thin lens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LensDesc {
+    /// Radius of the aperture, > 0.
+    pub radius: f64,
+    /// Distance of the plane in focus, along the view, > 0; that of the `target` where not given.
+    pub focus_distance: Option<f64>,
 }
 
 /// Where a camera stands and looks.
@@ -126,12 +142,24 @@ pub struct RenderSettings {
     pub integrator: IntegratorKind,
     /// Samples a pixel, ≥ 1.
     pub samples: u32,
-    /// Bounces: 0 is the camera ray and its direct light. `flat` and `direct` have none.
+    /// Bounces: 0 is the camera ray and its direct light. `flat`, `direct` and `ao` have none.
     pub max_depth: u32,
+    /// A branch of the ray tree ends where its weight (largest component) falls below this.
+    pub prune: f32,
+    /// Whether it ends there only with a probability that keeps the picture unbiased.
+    pub roulette: bool,
     /// How exact ray queries are.
     pub precision: Precision,
-    /// Whether things cast shadows.
-    pub shadows: bool,
+    /// What things cast shadows.
+    pub shadows: Shadows,
+    /// Shadow rays from each point to each light that has an area, ≥ 1.
+    pub shadow_samples: u32,
+    /// Where a scene has more lights, each point draws this many of them by what they contribute; ≥ 1.
+    pub light_samples: u32,
+    /// The one wavelength to trace, in nm; all of the visible ones where not given.
+    pub wavelength: Option<f64>,
+    /// How far `ao` looks; without end where not given.
+    pub ao_distance: Option<f64>,
     /// The reconstruction filter.
     pub filter: Filter,
     /// How rays leave surfaces.
@@ -143,11 +171,17 @@ pub struct RenderSettings {
 impl Default for RenderSettings {
     fn default() -> Self {
         Self {
-            integrator: IntegratorKind::Direct,
+            integrator: IntegratorKind::Whitted,
             samples: 16,
             max_depth: 8,
+            prune: 0.004,
+            roulette: false,
             precision: Precision::default(),
-            shadows: true,
+            shadows: Shadows::Opaque,
+            shadow_samples: 1,
+            light_samples: 16,
+            wavelength: None,
+            ao_distance: None,
             filter: Filter::default(),
             epsilon: Epsilon::Auto,
             build_quality: BuildQuality::default(),
@@ -162,19 +196,59 @@ pub enum IntegratorKind {
     Flat,
     /// Local illumination: ambient, diffuse and specular light of each source, with shadows.
     Direct,
+    /// The same at every hit of a tree of mirrored and refracted rays.
+    Whitted,
+    /// Ambient occlusion: the share of the surroundings that a point sees.
+    Ao,
 }
 
 impl IntegratorKind {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Flat, Self::Direct];
+    pub const ALL: [Self; 4] = [Self::Flat, Self::Direct, Self::Whitted, Self::Ao];
 
     /// The name in scene files and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Flat => "flat",
             Self::Direct => "direct",
+            Self::Whitted => "whitted",
+            Self::Ao => "ao",
         }
     }
+}
+
+/// What casts shadows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shadows {
+    /// Nothing.
+    None,
+    /// Everything, glass too.
+    Opaque,
+    /// Everything but glass, which light passes straight, dimmed by absorption.
+    Tinted,
+    /// The same, dimmed also by what each of the glass's surfaces reflects.
+    Fresnel,
+}
+
+impl Shadows {
+    /// Whether there are any.
+    pub const fn are_cast(self) -> bool {
+        !matches!(self, Self::None)
+    }
+
+    /// The name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "false",
+            Self::Opaque => "opaque",
+            Self::Tinted => "tinted",
+            Self::Fresnel => "fresnel",
+        }
+    }
+
+    /// Those with a name in scene files; `true` and `false` stand for `opaque` and none.
+    pub const NAMED: [(&str, Self); 3] =
+        [("opaque", Self::Opaque), ("tinted", Self::Tinted), ("fresnel", Self::Fresnel)];
 }
 
 /// How a ray that leaves a surface is kept from hitting it again.
@@ -191,8 +265,19 @@ pub enum Epsilon {
 pub struct MaterialDesc {
     /// Its name.
     pub name: String,
-    /// What it is.
+    /// How it scatters light.
     pub material: Material,
+    /// Radiance that it gives off, on both sides.
+    pub emission: Rgb,
+    /// What varies over the surface.
+    pub maps: Maps,
+}
+
+impl MaterialDesc {
+    /// A material that is the same everywhere and does not glow.
+    pub fn new(name: impl Into<String>, material: Material) -> Self {
+        Self { name: name.into(), material, emission: Rgb::BLACK, maps: Maps::default() }
+    }
 }
 
 /// Something in the scene.
@@ -206,6 +291,8 @@ pub struct ObjectDesc {
     pub material: Option<Reference>,
     /// World (or prototype) from object.
     pub transform: DAffine3,
+    /// Moves the textures on it, in the object's own space.
+    pub texture_transform: DAffine3,
 }
 
 impl ObjectDesc {
@@ -216,6 +303,7 @@ impl ObjectDesc {
             shape,
             material: material.map(Reference::new),
             transform: DAffine3::IDENTITY,
+            texture_transform: DAffine3::IDENTITY,
         }
     }
 }
@@ -229,6 +317,15 @@ pub enum ShapeDesc {
     Sphere {
         /// Centre.
         center: DVec3,
+        /// Radius, > 0.
+        radius: f64,
+    },
+    /// A flat disk.
+    Disk {
+        /// Centre.
+        center: DVec3,
+        /// Axis, any length but zero; it points to the front.
+        normal: DVec3,
         /// Radius, > 0.
         radius: f64,
     },
@@ -264,11 +361,55 @@ pub enum LightDesc {
         /// Dependence on the distance.
         falloff: Falloff,
     },
+    /// A point that shines into a cone.
+    Spot {
+        /// Where.
+        position: DVec3,
+        /// The way its axis points; any length but zero.
+        direction: DVec3,
+        /// Radiant intensity on the axis, W/sr.
+        intensity: Rgb,
+        /// Angle between the axis and where the light ends, in radians.
+        cone_angle: f64,
+        /// Width of the rim within it over which the light fades, in radians, ≤ `cone_angle`.
+        penumbra_angle: f64,
+    },
     /// Parallel light.
     Directional {
         /// The way the light travels; any length but zero.
         direction: DVec3,
         /// Irradiance on a plane that faces it, W/m².
         irradiance: Rgb,
+    },
+    /// A parallelogram that shines to one side, that of `edge_u` × `edge_v`.
+    Rectangle {
+        /// One of its corners.
+        corner: DVec3,
+        /// From there along one edge.
+        edge_u: DVec3,
+        /// From there along the other.
+        edge_v: DVec3,
+        /// Radiance, the same in all directions.
+        radiance: Rgb,
+    },
+    /// A disk that shines to one side.
+    Disk {
+        /// Centre.
+        center: DVec3,
+        /// The side it shines to; any length but zero.
+        normal: DVec3,
+        /// Radius, > 0.
+        radius: f64,
+        /// Radiance, the same in all directions.
+        radiance: Rgb,
+    },
+    /// A sphere.
+    Sphere {
+        /// Centre.
+        center: DVec3,
+        /// Radius, > 0.
+        radius: f64,
+        /// Radiance, the same in all directions.
+        radiance: Rgb,
     },
 }

@@ -7,14 +7,19 @@
 
 mod build;
 mod desc;
+mod lights;
+mod maps;
+mod media;
 mod place;
 mod requirements;
 mod surface;
 
 pub use build::{Scene, SceneError, UnknownName};
 pub use desc::{
-    CameraDesc, Epsilon, ImageDesc, IntegratorKind, LightDesc, Location, MaterialDesc, ObjectDesc,
-    PlaceDesc, PrototypeDesc, Reference, RenderSettings, SceneDesc, ShapeDesc,
+    CameraDesc, Epsilon, ImageDesc, IntegratorKind, LensDesc, LightDesc, Location, MaterialDesc,
+    ObjectDesc, PlaceDesc, PrototypeDesc, Reference, RenderSettings, SceneDesc, Shadows, ShapeDesc,
 };
-pub use requirements::Requirements;
+pub use maps::{Cone, Maps};
+pub use media::Crossing;
+pub use requirements::{Requirements, Variant};
 pub use surface::SurfacePoint;

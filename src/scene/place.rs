@@ -12,36 +12,49 @@ use rayon::prelude::*;
 
 use super::build::{NameIndex, SceneError};
 use super::desc::{ObjectDesc, SceneDesc, ShapeDesc};
+use super::maps::Maps;
 use crate::accel::{Geometry, Group, InstanceSet, World, rows_from_affine};
-use crate::geometry::{Sphere, TriangleMesh};
+use crate::geometry::{AnalyticShape, Disk, Sphere, TriangleMesh};
 use crate::math::Bounds;
 
 /// The world to be traced, and what belongs to it.
 #[derive(Debug, Default)]
 pub(super) struct Placed {
     pub(super) world: World,
-    /// Material of every geometry of the root group and of each prototype, in the world's order.
-    pub(super) root_materials: Vec<GeometryMaterials>,
-    pub(super) prototype_materials: Vec<Vec<GeometryMaterials>>,
+    /// The looks of every geometry of the root group and of each prototype, in the world's order.
+    pub(super) root_looks: Vec<GeometryLooks>,
+    pub(super) prototype_looks: Vec<Vec<GeometryLooks>>,
+    /// Where textures lie: texture space from the group's. The first is the identity; there are no
+    /// others where no material has a texture.
+    pub(super) frames: Vec<DAffine3>,
     /// What was subtracted from all world coordinates.
     pub(super) center: DVec3,
 }
 
-/// The materials of one geometry.
-#[derive(Debug, Clone)]
-pub(super) enum GeometryMaterials {
-    /// One for all primitives.
-    One(u32),
-    /// One for each primitive.
-    Each(Vec<u32>),
+/// What a primitive looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Look {
+    /// Index of its material.
+    pub(super) material: u32,
+    /// Index of its texture space.
+    pub(super) frame: u32,
 }
 
-impl GeometryMaterials {
+/// The looks of one geometry.
+#[derive(Debug, Clone)]
+pub(super) enum GeometryLooks {
+    /// One for all primitives.
+    One(Look),
+    /// One for each primitive.
+    Each(Vec<Look>),
+}
+
+impl GeometryLooks {
     #[inline]
-    pub(super) fn of(&self, primitive: u32) -> u32 {
+    pub(super) fn of(&self, primitive: u32) -> Look {
         match self {
-            Self::One(material) => *material,
-            Self::Each(materials) => materials[primitive as usize],
+            Self::One(look) => *look,
+            Self::Each(looks) => looks[primitive as usize],
         }
     }
 }
@@ -49,18 +62,23 @@ impl GeometryMaterials {
 /// What a group is made of before it is moved and rounded.
 #[derive(Debug, Default)]
 struct Draft {
-    /// (mesh, material, group from mesh).
-    meshes: Vec<(usize, u32, DAffine3)>,
-    spheres: Vec<(Sphere, u32)>,
+    /// (mesh, group from mesh).
+    meshes: Vec<(usize, DAffine3, DraftLook)>,
+    spheres: Vec<(Sphere, DraftLook)>,
+    disks: Vec<(Disk, DraftLook)>,
     /// Copies of other drafts, by index.
     copies: Vec<(usize, DAffine3)>,
 }
 
-/// Identity of a draft that several objects may share.
+/// A material, and where its textures lie: texture space from the group's, none where it has none.
+type DraftLook = (u32, Option<DAffine3>);
+
+/// Identity of a draft that several objects may share: what it holds, its material and, where that has
+/// textures, the bits of where they lie.
 #[derive(Debug, PartialEq, Eq, Hash)]
 enum Shared {
-    Mesh(usize, u32),
-    UnitSphere(u32),
+    Mesh(usize, u32, Option<[u64; 12]>),
+    UnitSphere(u32, Option<[u64; 12]>),
     Prototype(usize),
 }
 
@@ -81,6 +99,12 @@ const MAX_COPIES: u64 = 200_000_000;
 
 struct Placer<'a> {
     materials: &'a NameIndex,
+    /// The textures of each material, by index.
+    maps: &'a [Maps],
+    /// Whether each material gives off light.
+    glows: &'a [bool],
+    /// Whether each mesh has texture coordinates.
+    has_uvs: Vec<bool>,
     prototype_names: &'a NameIndex,
     prototypes: Vec<Option<Vec<ObjectDesc>>>,
     mesh_uses: Vec<u32>,
@@ -94,6 +118,8 @@ pub(super) fn place(
     desc: &mut SceneDesc,
     materials: &NameIndex,
     prototype_names: &NameIndex,
+    maps: &[Maps],
+    glows: &[bool],
 ) -> Result<Placed, Vec<SceneError>> {
     let mut mesh_uses = vec![0; desc.meshes.len()];
     let all = desc.prototypes.iter().flat_map(|p| &p.objects).chain(&desc.objects);
@@ -104,6 +130,9 @@ pub(super) fn place(
     }
     let mut placer = Placer {
         materials,
+        maps,
+        glows,
+        has_uvs: desc.meshes.iter().map(|mesh| mesh.uvs.is_some()).collect(),
         prototype_names,
         prototypes: desc
             .prototypes
@@ -143,23 +172,26 @@ pub(super) fn place(
         return Err(errors);
     }
 
-    let mut placed = Placed { center, ..Placed::default() };
+    let mut placed = Placed { center, frames: vec![DAffine3::IDENTITY], ..Placed::default() };
     // A draft of nothing but copies is no group of its own.
-    let has_shapes = |d: &Draft| !d.meshes.is_empty() || !d.spheres.is_empty();
+    let has_shapes =
+        |d: &Draft| !d.meshes.is_empty() || !d.spheres.is_empty() || !d.disks.is_empty();
     let used = |d: &Draft, c: &[DAffine3]| !c.is_empty() && has_shapes(d);
     let mut uses_left = vec![0u32; meshes.len()];
     let kept = drafts.iter().zip(&copies).filter(|(d, c)| used(d, c)).map(|(d, _)| d);
     for (mesh, ..) in kept.chain([&root]).flat_map(|d| &d.meshes) {
         uses_left[*mesh] += 1;
     }
-    let mut group = |draft: &Draft, origin: DVec3| draft.group(origin, &mut meshes, &mut uses_left);
-    (placed.world.root, placed.root_materials) = group(&root, center);
+    let frames = &mut placed.frames;
+    let mut group =
+        |draft: &Draft, origin: DVec3| draft.group(origin, &mut meshes, &mut uses_left, frames);
+    (placed.world.root, placed.root_looks) = group(&root, center);
     for ((draft, transforms), bounds) in drafts.iter().zip(&copies).zip(&bounds) {
         if !used(draft, transforms) {
             continue;
         }
         let origin = bounds.far_center();
-        let (group, materials) = group(draft, origin);
+        let (group, looks) = group(draft, origin);
         let rows = transforms.iter().map(|m| {
             let centred =
                 DAffine3::from_translation(-center) * *m * DAffine3::from_translation(origin);
@@ -170,7 +202,7 @@ pub(super) fn place(
             transforms: Arc::new(rows.collect()),
         });
         placed.world.prototypes.push(group);
-        placed.prototype_materials.push(materials);
+        placed.prototype_looks.push(looks);
     }
     Ok(placed)
 }
@@ -191,41 +223,84 @@ impl Placer<'_> {
                 },
             };
             let m = object.transform;
-            if let Err(error) = check_transform(&m, &object) {
+            let checked = check_transform(&m, "transform", &object).and_then(|()| {
+                check_transform(&object.texture_transform, "texture_transform", &object)
+            });
+            if let Err(error) = checked {
                 self.errors.push(error);
                 continue;
             }
+            // Textures lie in the object's own space, moved by its `texture_transform`.
+            let look = |object_from_group: &DAffine3| -> DraftLook {
+                let has_maps = !self.maps[material as usize].is_empty();
+                let textures = object.texture_transform.inverse();
+                (material, has_maps.then(|| textures * *object_from_group))
+            };
+            if let ShapeDesc::Mesh(mesh) = object.shape
+                && !self.has_uvs[mesh]
+                && self.maps[material as usize].needs_uv()
+            {
+                self.errors.push(SceneError::NoTextureCoordinates {
+                    at: object.at.clone(),
+                    material: self.materials.name(material - 1).to_owned(),
+                });
+            }
             match object.shape {
                 ShapeDesc::Mesh(mesh) if self.mesh_uses[mesh] == 1 => {
-                    draft.meshes.push((mesh, material, m));
+                    draft.meshes.push((mesh, m, look(&m.inverse())));
                 }
                 ShapeDesc::Mesh(mesh) => {
+                    let look = look(&DAffine3::IDENTITY);
                     let only = || Draft {
-                        meshes: vec![(mesh, material, DAffine3::IDENTITY)],
+                        meshes: vec![(mesh, DAffine3::IDENTITY, look)],
                         ..Draft::default()
                     };
-                    let shared = self.share(Shared::Mesh(mesh, material), only);
+                    let shared = self.share(Shared::Mesh(mesh, material, bits(&look)), only);
                     self.copy(&mut draft, shared, m, &object);
                 }
                 ShapeDesc::Sphere { center, radius } => match uniform_scale(&m.matrix3) {
                     Some(scale) => {
                         let sphere =
                             Sphere { center: m.transform_point3(center), radius: radius * scale };
-                        draft.spheres.push((sphere, material));
+                        draft.spheres.push((sphere, look(&m.inverse())));
+                    }
+                    None if self.glows[material as usize] => {
+                        self.errors.push(SceneError::GlowingEllipsoid { at: object.at.clone() });
                     }
                     // An ellipsoid is a copy of the unit sphere.
                     None => {
-                        let unit = Sphere { center: DVec3::ZERO, radius: 1.0 };
-                        let only = || Draft { spheres: vec![(unit, material)], ..Draft::default() };
-                        let shared = self.share(Shared::UnitSphere(material), only);
                         let place = DAffine3::from_scale_rotation_translation(
                             DVec3::splat(radius),
                             glam::DQuat::IDENTITY,
                             center,
                         );
+                        let look = look(&place);
+                        let unit = Sphere { center: DVec3::ZERO, radius: 1.0 };
+                        let only = || Draft { spheres: vec![(unit, look)], ..Draft::default() };
+                        let shared = self.share(Shared::UnitSphere(material, bits(&look)), only);
                         self.copy(&mut draft, shared, m * place, &object);
                     }
                 },
+                ShapeDesc::Disk { center, normal, radius } => {
+                    let disk = Disk { center, normal: normal.normalize(), radius };
+                    match uniform_scale(&m.matrix3) {
+                        Some(scale) => {
+                            let center = m.transform_point3(center);
+                            // A mirror would turn a normal that is moved as a vector inside out.
+                            let normal = m.matrix3.inverse().transpose() * disk.normal;
+                            let disk =
+                                Disk { center, normal: normal.normalize(), radius: radius * scale };
+                            draft.disks.push((disk, look(&m.inverse())));
+                        }
+                        None => {
+                            let look = look(&DAffine3::IDENTITY);
+                            self.drafts
+                                .push(Draft { disks: vec![(disk, look)], ..Draft::default() });
+                            let own = self.drafts.len() - 1;
+                            self.copy(&mut draft, own, m, &object);
+                        }
+                    }
+                }
                 ShapeDesc::Instances { ref prototype, ref transforms } => {
                     let index = match self.prototype_names.find(prototype, "prototype") {
                         Ok(index) => index as usize,
@@ -291,9 +366,10 @@ impl Placer<'_> {
 impl Draft {
     /// The box around its own meshes and spheres, before it is moved. A mesh counts by its own box.
     fn bounds(&self, mesh_bounds: &[Bounds]) -> Bounds {
-        let meshes = self.meshes.iter().map(|(mesh, _, m)| mesh_bounds[*mesh].transformed(m));
+        let meshes = self.meshes.iter().map(|(mesh, m, _)| mesh_bounds[*mesh].transformed(m));
         let spheres = self.spheres.iter().map(|(sphere, _)| sphere.bounds());
-        meshes.chain(spheres).fold(Bounds::EMPTY, Bounds::union)
+        let disks = self.disks.iter().map(|(disk, _)| disk.bounds());
+        meshes.chain(spheres).chain(disks).fold(Bounds::EMPTY, Bounds::union)
     }
 
     /// The group to be traced, relative to `origin`. A mesh's last use takes its buffers.
@@ -302,24 +378,40 @@ impl Draft {
         origin: DVec3,
         meshes: &mut [Option<TriangleMesh>],
         uses_left: &mut [u32],
-    ) -> (Group, Vec<GeometryMaterials>) {
-        let (mut geometries, mut materials) = (Vec::new(), Vec::new());
-        for &(index, material, transform) in &self.meshes {
-            uses_left[index] -= 1;
-            let slot = &mut meshes[index];
-            let mesh = if uses_left[index] == 0 { slot.take() } else { slot.clone() };
+        frames: &mut Vec<DAffine3>,
+    ) -> (Group, Vec<GeometryLooks>) {
+        let (mut geometries, mut looks) = (Vec::new(), Vec::new());
+        let mut look = |&(material, frame): &DraftLook| {
+            let Some(frame) = frame else { return Look { material, frame: 0 } };
+            frames.push(frame * DAffine3::from_translation(origin));
+            Look { material, frame: frames.len() as u32 - 1 }
+        };
+        for (index, transform, draft_look) in &self.meshes {
+            uses_left[*index] -= 1;
+            let slot = &mut meshes[*index];
+            let mesh = if uses_left[*index] == 0 { slot.take() } else { slot.clone() };
             let Some(mesh) = mesh else { continue };
-            geometries.push(Geometry::Mesh(moved(mesh, &transform, origin)));
-            materials.push(GeometryMaterials::One(material));
+            geometries.push(Geometry::Mesh(moved(mesh, transform, origin)));
+            looks.push(GeometryLooks::One(look(draft_look)));
         }
         if !self.spheres.is_empty() {
             let moved =
                 self.spheres.iter().map(|(s, _)| Sphere { center: s.center - origin, ..*s });
             geometries.push(Geometry::Spheres(Arc::new(moved.collect())));
-            materials.push(GeometryMaterials::Each(self.spheres.iter().map(|(_, m)| *m).collect()));
+            looks.push(GeometryLooks::Each(self.spheres.iter().map(|(_, l)| look(l)).collect()));
         }
-        (Group { geometries }, materials)
+        if !self.disks.is_empty() {
+            let moved = self.disks.iter().map(|(d, _)| Disk { center: d.center - origin, ..*d });
+            geometries.push(Geometry::Disks(Arc::new(moved.collect())));
+            looks.push(GeometryLooks::Each(self.disks.iter().map(|(_, l)| look(l)).collect()));
+        }
+        (Group { geometries }, looks)
     }
+}
+
+/// What tells one texture space from another.
+fn bits(look: &DraftLook) -> Option<[u64; 12]> {
+    look.1.map(|frame| frame.to_cols_array().map(f64::to_bits))
 }
 
 /// The mesh in the space of its group: transformed and moved in f64, rounded once, in place.
@@ -355,7 +447,7 @@ fn moved(mut mesh: TriangleMesh, transform: &DAffine3, group_origin: DVec3) -> T
 }
 
 /// The common factor of a transform that only rotates, mirrors and scales evenly.
-fn uniform_scale(m: &DMat3) -> Option<f64> {
+pub(super) fn uniform_scale(m: &DMat3) -> Option<f64> {
     let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
     let scale = x.length();
     let near = |value: f64, expected: f64| (value - expected).abs() <= 1e-12 * scale * scale;
@@ -364,12 +456,16 @@ fn uniform_scale(m: &DMat3) -> Option<f64> {
     (even && square).then_some(scale)
 }
 
-fn check_transform(m: &DAffine3, object: &ObjectDesc) -> Result<(), SceneError> {
+fn check_transform(
+    m: &DAffine3,
+    what: &'static str,
+    object: &ObjectDesc,
+) -> Result<(), SceneError> {
     if !m.is_finite() {
-        return Err(SceneError::TransformNotFinite { at: object.at.clone() });
+        return Err(SceneError::TransformNotFinite { at: object.at.clone(), what });
     }
     if is_singular(&m.matrix3) {
-        return Err(SceneError::TransformSingular { at: object.at.clone() });
+        return Err(SceneError::TransformSingular { at: object.at.clone(), what });
     }
     Ok(())
 }

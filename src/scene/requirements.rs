@@ -1,9 +1,36 @@
 //! What a scene requires of a renderer: what is absent is not allocated, not tested, not traced.
 
+use super::maps::Maps;
 use crate::accel::{Geometry, World};
 use crate::light::{Falloff, Light};
-use crate::material::Material;
-use crate::scene::desc::{IntegratorKind, RenderSettings};
+use crate::material::{Ior, Material};
+use crate::scene::desc::{IntegratorKind, RenderSettings, Shadows};
+
+/// The compiled variants of the ray tree, each with all of those before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Variant {
+    /// Lamps, diffuse and shiny surfaces.
+    #[default]
+    Local,
+    /// And mirrors and glass.
+    Tree,
+    /// And textures, area lights, many lights, glowing surfaces, fog, light through glass, dispersion.
+    Everything,
+}
+
+impl Variant {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Local, Self::Tree, Self::Everything];
+
+    /// The name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Local => "local",
+            Self::Tree => "tree",
+            Self::Everything => "everything",
+        }
+    }
+}
 
 /// The things that a scene really has.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -20,8 +47,18 @@ pub struct Requirements {
     pub copies: u64,
     /// Primitives that rays meet, copies counted each.
     pub drawn_primitives: u64,
+    /// Disks stored.
+    pub disks: u64,
     /// Materials with a highlight.
     pub specular_materials: u64,
+    /// Materials that mirror: mirrors, metals, `phong` with a mirror coefficient.
+    pub mirrors: u64,
+    /// Materials of glass.
+    pub dielectrics: u64,
+    /// Those whose index of refraction depends on the wavelength.
+    pub dispersive: u64,
+    /// Materials with textures, normal or bump maps.
+    pub textured_materials: u64,
     /// Point lights with inverse-square falloff.
     pub point_lights: u64,
     /// Point lights without falloff.
@@ -30,23 +67,51 @@ pub struct Requirements {
     pub directional_lights: u64,
     /// Spot lights.
     pub spot_lights: u64,
-    /// Lights of some size.
+    /// Lights with an area, glowing objects included.
     pub area_lights: u64,
+    /// Whether lights are drawn at random, as there are too many to ask each.
+    pub picks_lights: bool,
+    /// Whether any material glows.
+    pub glows: bool,
+    /// Whether there is fog.
+    pub fog: bool,
+    /// Whether the camera has a lens.
+    pub lens: bool,
     /// Whether the scene has no light of its own and is lit from the camera's side.
     pub lit_automatically: bool,
     /// Whether shadow rays are traced.
     pub shadow_rays: bool,
+    /// Whether light passes glass on its way to surfaces.
+    pub transparent_shadows: bool,
+    /// Which variant of the ray tree is run.
+    pub variant: Variant,
+}
+
+/// What a scene is made of.
+pub(super) struct Contents<'a> {
+    pub(super) world: &'a World,
+    pub(super) materials: &'a [Material],
+    pub(super) maps: &'a [Maps],
+    pub(super) lights: &'a [Light],
+    pub(super) picks_lights: bool,
+    pub(super) glows: bool,
+    pub(super) fog: bool,
+    pub(super) lens: bool,
+    pub(super) settings: &'a RenderSettings,
+    pub(super) lit_automatically: bool,
 }
 
 impl Requirements {
-    pub(super) fn of(
-        world: &World,
-        materials: &[Material],
-        lights: &[Light],
-        settings: &RenderSettings,
-        lit_automatically: bool,
-    ) -> Self {
-        let mut r = Self { lit_automatically, ..Self::default() };
+    pub(super) fn of(contents: &Contents<'_>) -> Self {
+        let &Contents { world, materials, maps, lights, settings, .. } = contents;
+        let mut r = Self {
+            picks_lights: contents.picks_lights,
+            glows: contents.glows,
+            fog: contents.fog,
+            lens: contents.lens,
+            lit_automatically: contents.lit_automatically,
+            ..Self::default()
+        };
         let primitives = |group: &crate::accel::Group| {
             group.geometries.iter().map(|g| g.len() as u64).sum::<u64>()
         };
@@ -59,6 +124,7 @@ impl Requirements {
                     r.smooth_meshes += u64::from(mesh.normals.is_some());
                 }
                 Geometry::Spheres(spheres) => r.spheres += spheres.len() as u64,
+                Geometry::Disks(disks) => r.disks += disks.len() as u64,
             }
         }
         r.prototypes = world.prototypes.len() as u64;
@@ -68,24 +134,59 @@ impl Requirements {
             r.copies += copies;
             r.drawn_primitives += copies * primitives(&world.prototypes[set.prototype as usize]);
         }
-        for material in materials {
-            if let Material::Phong(phong) = material {
-                r.specular_materials += u64::from(!phong.specular.is_black());
+        for (i, material) in materials.iter().enumerate() {
+            match material {
+                Material::Diffuse { .. } => {}
+                Material::Phong(phong) => {
+                    r.specular_materials += u64::from(!phong.specular.is_black());
+                    // The coefficient may be nothing but a texture.
+                    let is_mapped = maps.get(i).is_some_and(|maps| maps.mirror.is_some());
+                    r.mirrors += u64::from(is_mapped || !phong.mirror.is_black());
+                }
+                Material::Mirror { .. } | Material::Conductor(_) => r.mirrors += 1,
+                Material::Dielectric(glass) => {
+                    r.dielectrics += 1;
+                    r.dispersive += u64::from(Ior::is_dispersive(&glass.ior));
+                }
             }
         }
+        r.textured_materials = maps.iter().filter(|maps| !maps.is_empty()).count() as u64;
         for light in lights {
             match light {
                 Light::Point(light) if light.falloff == Falloff::None => r.lecture_lights += 1,
                 Light::Point(_) => r.point_lights += 1,
                 Light::Directional(_) => r.directional_lights += 1,
                 Light::Spot(_) => r.spot_lights += 1,
-                Light::Rectangle(_) | Light::Disk(_) | Light::Sphere(_) | Light::Mesh(_) => {
-                    r.area_lights += 1;
-                }
+                _ => r.area_lights += 1,
             }
         }
-        r.shadow_rays =
-            settings.shadows && settings.integrator != IntegratorKind::Flat && !lights.is_empty();
+        let is_lit =
+            matches!(settings.integrator, IntegratorKind::Direct | IntegratorKind::Whitted);
+        r.shadow_rays = is_lit && settings.shadows != Shadows::None && !lights.is_empty();
+        r.transparent_shadows = r.shadow_rays
+            && r.dielectrics > 0
+            && matches!(settings.shadows, Shadows::Tinted | Shadows::Fresnel);
+        r.variant = r.variant(settings);
         r
+    }
+
+    /// The least variant that knows of all there is.
+    fn variant(&self, settings: &RenderSettings) -> Variant {
+        let is_tree = settings.integrator == IntegratorKind::Whitted;
+        if self.textured_materials > 0
+            || self.area_lights > 0
+            || self.picks_lights
+            || self.glows
+            || self.fog
+            || self.transparent_shadows
+            || (is_tree && self.dispersive > 0)
+        {
+            return Variant::Everything;
+        }
+        // Even without bounces a camera may stand in glass.
+        if self.dielectrics > 0 || (is_tree && self.mirrors > 0) {
+            return Variant::Tree;
+        }
+        Variant::Local
     }
 }

@@ -1,10 +1,10 @@
 //! From a hit to the point of the surface that it means: position with its error, normals, sides.
 
-use glam::{DMat3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 use super::build::Scene;
 use crate::accel::{Geometry, Hit, Transform3x4, affine_from_rows};
-use crate::geometry::{Sphere, TriangleMesh};
+use crate::geometry::{Disk, Sphere, TriangleMesh};
 use crate::material::Material;
 use crate::math::{Ray, gamma, offset_ray_origin};
 use crate::scene::desc::Epsilon;
@@ -25,6 +25,8 @@ pub struct SurfacePoint<'a> {
     pub is_front: bool,
     /// What the surface is made of.
     pub material: &'a Material,
+    /// The scene's number of that material.
+    pub material_index: u32,
 }
 
 /// Position, error, outward geometric and shading normal (of unit length, or zero where there is none)
@@ -38,14 +40,41 @@ struct Local {
 
 impl Scene {
     /// The point that `ray` hit. It is found on the surface itself, not along the ray.
-    #[inline]
+    #[inline(always)]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint<'_> {
+        // The short way: no transform, and a normal that always is there.
+        if hit.copy.is_none()
+            && let Geometry::Spheres(spheres) = &self.world.root.geometries[hit.geometry as usize]
+        {
+            let material_index = self.look(hit).material;
+            let local = on_sphere(&spheres[hit.primitive as usize], ray, hit.t, None);
+            let is_front = local.normal.dot(ray.direction) <= 0.0;
+            let normal = if is_front { local.normal } else { -local.normal };
+            return SurfacePoint {
+                position: local.position,
+                error: local.error,
+                geometric_normal: normal,
+                normal,
+                is_front,
+                material: &self.materials[material_index as usize],
+                material_index,
+            };
+        }
+        self.surface_of_any(ray, hit)
+    }
+
+    /// The point of a surface of any kind, copies included.
+    fn surface_of_any(&self, ray: &Ray, hit: &Hit) -> SurfacePoint<'_> {
         let geometry = &self.world.group(hit.copy).geometries[hit.geometry as usize];
+        let material_index = self.look(hit).material;
         let transform = hit.copy.map(|copy| self.world.transform(copy));
         let local = match geometry {
             Geometry::Mesh(mesh) => on_triangle(mesh, hit),
             Geometry::Spheres(spheres) => {
                 on_sphere(&spheres[hit.primitive as usize], ray, hit.t, transform)
+            }
+            Geometry::Disks(disks) => {
+                on_disk(&disks[hit.primitive as usize], ray, hit.t, transform)
             }
         };
         let placed = match transform {
@@ -65,7 +94,21 @@ impl Scene {
             geometric_normal: outward * side,
             normal: normal * side,
             is_front,
-            material: self.material(hit),
+            material: &self.materials[material_index as usize],
+            material_index,
+        }
+    }
+
+    /// Where rays that leave `point` on the viewer's side start, and the distance from there up to which
+    /// hits are none: what a light is asked for whose points differ.
+    #[inline]
+    pub fn departure(&self, point: &SurfacePoint<'_>) -> (Vec3, f32) {
+        match self.settings.epsilon {
+            Epsilon::Auto => {
+                let n = point.geometric_normal;
+                (offset_ray_origin(point.position, point.error, n, n), 0.0)
+            }
+            Epsilon::Fixed(epsilon) => (point.position, epsilon),
         }
     }
 
@@ -128,14 +171,31 @@ fn on_triangle(mesh: &TriangleMesh, hit: &Hit) -> Local {
 /// The point of the sphere nearest to where the ray says it hit, in f64, rounded once.
 #[inline]
 fn on_sphere(sphere: &Sphere, ray: &Ray, t: f32, transform: Option<&Transform3x4>) -> Local {
+    let normal = sphere.normal_at(point_along(ray, t, transform));
+    let position = (sphere.center + normal * sphere.radius).as_vec3();
+    rounded_once(position, normal)
+}
+
+/// The point of the disk's plane nearest to where the ray says it hit, in f64, rounded once.
+#[inline]
+fn on_disk(disk: &Disk, ray: &Ray, t: f32, transform: Option<&Transform3x4>) -> Local {
+    let position = disk.nearest(point_along(ray, t, transform)).as_vec3();
+    rounded_once(position, disk.normal)
+}
+
+/// The point at distance `t` of a ray, in the space of its copy, in f64.
+#[inline]
+fn point_along(ray: &Ray, t: f32, transform: Option<&Transform3x4>) -> DVec3 {
     let (mut o, mut d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     if let Some(rows) = transform {
         let object_from_world = affine_from_rows(rows).inverse();
         o = object_from_world.transform_point3(o);
         d = object_from_world.transform_vector3(d);
     }
-    let normal = sphere.normal_at(o + d * f64::from(t));
-    let position = (sphere.center + normal * sphere.radius).as_vec3();
+    o + d * f64::from(t)
+}
+
+fn rounded_once(position: Vec3, normal: DVec3) -> Local {
     let n = normal.as_vec3();
     Local {
         position,

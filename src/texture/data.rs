@@ -53,6 +53,15 @@ impl Pixels {
         }
     }
 
+    /// The values as they are in memory.
+    pub fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::Srgb8(v) | Self::Linear8(v) => v,
+            Self::Linear16(v) | Self::Half(v) => bytemuck::cast_slice(v),
+            Self::Float(v) => bytemuck::cast_slice(v),
+        }
+    }
+
     /// Sets what is NaN or infinite to 0; returns how many values that were.
     fn zero_non_finite(&mut self) -> usize {
         fn zero<T: Copy + Default>(values: &mut [T], bad: impl Fn(T) -> bool) -> usize {

@@ -1,29 +1,28 @@
 //! Our own scene format: tables become a [`SceneDesc`]. The format is described in `docs/scene.md`.
 
+mod camera;
+mod light;
+mod material;
+mod settings;
+mod texture;
+
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use glam::{DAffine3, DMat4, DVec3};
+use glam::{DAffine3, DVec3};
 
 use super::document::{Document, Node, Value};
 use super::fields::{Fields, Reader};
 use super::mesh::read_mesh;
 use super::mistakes::Mistakes;
 use super::transforms::{affine, read_transforms, transform};
-use crate::accel::{BuildQuality, Precision};
-use crate::camera::Projection;
-use crate::color::Rgb;
-use crate::film::Filter;
 use crate::geometry::TriangleMesh;
-use crate::light::Falloff;
-use crate::material::{Material, Phong, PhongModel};
-use crate::scene::{
-    CameraDesc, Epsilon, ImageDesc, IntegratorKind, LightDesc, MaterialDesc, ObjectDesc, PlaceDesc,
-    PrototypeDesc, Reference, RenderSettings, SceneDesc, ShapeDesc,
-};
-
-/// Most pixels on a side.
-const MAX_SIDE: u32 = 65_535;
+use crate::scene::{ObjectDesc, PrototypeDesc, Reference, SceneDesc, ShapeDesc};
+use camera::{camera, image};
+use light::{fog, light};
+use material::material;
+use settings::settings;
+use texture::Textures;
 
 /// What a document says, and what should be told about it.
 pub(super) struct Interpreted {
@@ -74,16 +73,20 @@ impl<'d, 'r> Interpreter<'d, 'r> {
             self.scene.ambient = fields.require_color("radiance");
             fields.finish();
         }
+        if let Some(fields) = self.table(&root, "medium", "[medium]") {
+            self.scene.fog = fog(self.reader, fields);
+        }
         self.cameras(&root, camera);
         if let Some(fields) = self.table(&root, "materials", "[materials]") {
+            let mut textures = Textures::new(self.reader, self.folder);
             for (name, node) in fields.all() {
                 let what = format!("[materials.{name}]");
-                if let Some(fields) = self.reader.table(node, &what)
-                    && let Some(material) = material(fields)
-                {
-                    self.scene.materials.push(MaterialDesc { name: name.to_owned(), material });
+                if let Some(fields) = self.reader.table(node, &what) {
+                    let material = material(self.reader, &mut textures, name, fields);
+                    self.scene.materials.extend(material);
                 }
             }
+            self.warnings.append(&mut textures.warnings);
         }
         if let Some(node) = root.get("lights") {
             for node in self.reader.list(node, "lights") {
@@ -200,10 +203,17 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 .map(|name| Reference { name: name.to_owned(), at: self.reader.locate(node.span) }),
             None => None,
         };
-        let transform = fields.get("transform").and_then(|node| transform(self.reader, node));
+        let steps = |name: &'static str| {
+            let transform = fields.get(name).and_then(|node| transform(self.reader, node, name));
+            transform.unwrap_or(DAffine3::IDENTITY)
+        };
+        let own = steps("transform");
+        // The objects of a prototype have theirs.
+        let texture_transform =
+            if kind == "instance" { DAffine3::IDENTITY } else { steps("texture_transform") };
         fields.finish();
-        let transform = transform.unwrap_or(DAffine3::IDENTITY);
-        desc.map(|shape| ObjectDesc { at, shape, material, transform })
+        let transform = own;
+        desc.map(|shape| ObjectDesc { at, shape, material, transform, texture_transform })
     }
 
     fn shape(&mut self, fields: &Fields<'d, 'r>, kind: ShapeKind) -> Option<ShapeDesc> {
@@ -320,7 +330,7 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                         Value::Array(items)
                             if items.iter().all(|i| matches!(i.value, Value::Table(_))) =>
                         {
-                            transform(self.reader, row)
+                            transform(self.reader, row, "transforms")
                         }
                         Value::Array(items) if items.len() == 12 => {
                             self.reader.numbers::<12>(row, "transforms").map(|m| affine(&m))
@@ -360,188 +370,4 @@ impl ShapeKind {
 fn inline_mesh(xyz: &[f64], triangles: Vec<[u32; 3]>) -> TriangleMesh {
     let (origin, xyz) = super::mesh::place(xyz);
     TriangleMesh { origin, ..TriangleMesh::new(xyz, triangles) }
-}
-
-fn image(fields: Fields<'_, '_>) -> ImageDesc {
-    let mut image = ImageDesc::default();
-    if let Some(node) = fields.get("size") {
-        match &node.value {
-            Value::Array(sides) => match sides.as_slice() {
-                [Node { value: Value::Integer(w), .. }, Node { value: Value::Integer(h), .. }]
-                    if [w, h].iter().all(|x| (1..=i64::from(MAX_SIDE)).contains(x)) =>
-                {
-                    image.size = [*w as u32, *h as u32];
-                }
-                _ => fields.expected(node, "size", &size_expected()),
-            },
-            _ => fields.expected(node, "size", &size_expected()),
-        }
-    }
-    image.background = fields.color("background");
-    fields.finish();
-    image
-}
-
-fn size_expected() -> String {
-    format!("[width, height] in pixels, whole numbers from 1 to {MAX_SIDE}")
-}
-
-fn settings(reader: &Reader<'_>, fields: Fields<'_, '_>) -> RenderSettings {
-    let default = RenderSettings::default();
-    let settings = RenderSettings {
-        integrator: fields
-            .choice("integrator", &IntegratorKind::ALL.map(|i| (i.name(), i)))
-            .unwrap_or(default.integrator),
-        samples: fields.integer("samples", 1, 1 << 24).unwrap_or(default.samples),
-        max_depth: fields.integer("max_depth", 0, 1 << 20).unwrap_or(default.max_depth),
-        precision: fields
-            .choice("precision", &Precision::ALL.map(|p| (p.name(), p)))
-            .unwrap_or(default.precision),
-        shadows: fields.bool("shadows").unwrap_or(default.shadows),
-        filter: fields
-            .choice("filter", &Filter::ALL.map(|f| (f.name(), f)))
-            .unwrap_or(default.filter),
-        epsilon: match fields.get("epsilon") {
-            None => default.epsilon,
-            Some(node) => match &node.value {
-                Value::String(text) if text == "auto" => Epsilon::Auto,
-                Value::Integer(_) | Value::Float(_) => fields
-                    .not_negative(node, "epsilon")
-                    .map_or(default.epsilon, |e| Epsilon::Fixed(e as f32)),
-                _ => {
-                    reader.expected(node, "epsilon", "\"auto\" or a distance from 0 on");
-                    default.epsilon
-                }
-            },
-        },
-        build_quality: fields
-            .choice("build_quality", &BuildQuality::ALL.map(|q| (q.name(), q)))
-            .unwrap_or(default.build_quality),
-    };
-    fields.finish();
-    settings
-}
-
-fn camera(reader: &Reader<'_>, fields: Fields<'_, '_>) -> CameraDesc {
-    let at = fields.location();
-    let kinds = [("perspective", false), ("orthographic", true)];
-    let is_parallel = fields.choice("projection", &kinds).unwrap_or(false);
-    let projection = if is_parallel {
-        let node = fields.get("height");
-        if node.is_none() && (fields.has("eye") || fields.has("transform")) {
-            reader.mistake(fields.span(), "an orthographic camera that is placed needs a `height`");
-        }
-        let height = node.and_then(|node| fields.positive(node, "height"));
-        // 0: as high as the scene, with the place.
-        Projection::Orthographic { height: height.unwrap_or(0.0) }
-    } else {
-        let mut fov = 40.0;
-        if let Some(node) = fields.get("fov")
-            && let Some(degrees) = reader.number(node, "fov")
-        {
-            if degrees > 0.0 && degrees < 180.0 {
-                fov = degrees;
-            } else {
-                reader.expected(node, "fov", "an angle between 0 and 180 degrees");
-            }
-        }
-        Projection::Perspective { fov: fov.to_radians() }
-    };
-    let place = match fields.get("transform") {
-        Some(node) => {
-            let matrix = transform(reader, node).map(|m| PlaceDesc::Matrix(DMat4::from(m)));
-            for name in ["eye", "target", "up"] {
-                if let Some(node) = fields.get(name) {
-                    let message = format!("`{name}` and `transform` exclude each other");
-                    reader.mistake(node.span, message);
-                }
-            }
-            matrix
-        }
-        None => {
-            let (eye, target) = (fields.vector("eye"), fields.vector("target"));
-            let up = fields.vector("up").unwrap_or(DVec3::Y);
-            match (eye, target) {
-                (Some(eye), target) => {
-                    // Straight ahead where only the place is given.
-                    let target = target.unwrap_or(eye - DVec3::Z * (1.0 + eye.length()));
-                    Some(PlaceDesc::LookAt { eye, target, up })
-                }
-                (None, None) if !fields.has("up") => None,
-                (None, _) if fields.has("eye") => None,
-                (None, _) => {
-                    reader
-                        .mistake(fields.span(), "a camera with a `target` or `up` needs an `eye`");
-                    None
-                }
-            }
-        }
-    };
-    fields.finish();
-    CameraDesc { at, projection, place }
-}
-
-fn material(fields: Fields<'_, '_>) -> Option<Material> {
-    let kinds = [("diffuse", false), ("phong", true)];
-    let is_phong = fields.require("type").and_then(|node| fields.choose(node, "type", &kinds));
-    let material = match is_phong {
-        // Without its type, nothing can be said of the other fields.
-        None => return None,
-        Some(false) => {
-            let reflectance = match fields.get("reflectance") {
-                Some(node) => fields.reflectance(node, "reflectance").unwrap_or_default(),
-                None => Rgb::splat(0.6),
-            };
-            Material::Diffuse { reflectance }
-        }
-        Some(true) => {
-            let diffuse = fields.color("diffuse").unwrap_or(Rgb::splat(0.6));
-            let ambient = fields.color("ambient").unwrap_or(diffuse);
-            let specular = fields.color("specular").unwrap_or(Rgb::BLACK);
-            let shininess = match fields.get("shininess") {
-                Some(node) => fields.not_negative(node, "shininess").unwrap_or(1.0),
-                None => 32.0,
-            };
-            let models = [("blinn-phong", PhongModel::BlinnPhong), ("phong", PhongModel::Phong)];
-            let model = fields.choice("model", &models).unwrap_or_default();
-            let shininess = shininess as f32;
-            Material::Phong(Phong { ambient, diffuse, specular, shininess, model })
-        }
-    };
-    fields.finish();
-    Some(material)
-}
-
-fn light(reader: &Reader<'_>, fields: Fields<'_, '_>) -> Option<LightDesc> {
-    let kinds = [("point", false), ("directional", true)];
-    let node = fields.require("type")?;
-    let is_directional = fields.choose(node, "type", &kinds)?;
-    let light = if is_directional {
-        let direction = fields.require_vector("direction");
-        let irradiance = fields.require_color("irradiance");
-        let direction = direction.filter(|d| {
-            let is_zero = d.length() < 1e-30;
-            if is_zero {
-                let node = fields.get("direction");
-                let span = node.map_or(fields.span(), |node| node.span);
-                reader.mistake(span, "the `direction` of a light must not be zero");
-            }
-            !is_zero
-        });
-        direction
-            .zip(irradiance)
-            .map(|(direction, irradiance)| LightDesc::Directional { direction, irradiance })
-    } else {
-        let position = fields.require_vector("position");
-        let intensity = fields.require_color("intensity");
-        let falloffs = [("inverse-square", Falloff::InverseSquare), ("none", Falloff::None)];
-        let falloff = fields.choice("falloff", &falloffs).unwrap_or_default();
-        position.zip(intensity).map(|(position, intensity)| LightDesc::Point {
-            position,
-            intensity,
-            falloff,
-        })
-    };
-    fields.finish();
-    light
 }

@@ -1,0 +1,253 @@
+//! What the ray tree costs beyond its ray queries: the field of spheres, rendered whole and replayed as
+//! bare queries; and compared with other renderers where they are installed.
+//!
+//! `make bench` prints medians over interleaved rounds. POV-Ray is compared where `povray` is found,
+//! Mitsuba 3 where the Python of `ALHAZEN_PYTHON` (or `python3`) has it.
+#![allow(clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
+
+mod common;
+
+use std::sync::Mutex;
+
+use alhazen::accel::{Accel, Hit, HitBlock, RayBlock, RayQuery};
+use alhazen::film::Picture;
+use alhazen::integrator::{CameraBlock, Integrator, RayCounts, Tree, Whitted};
+use alhazen::math::Ray;
+use alhazen::measure::{CompareOptions, compare};
+use alhazen::render::{RenderJob, render};
+use alhazen::scene::{Scene, Shadows};
+use common::{camera_blocks, median, peers, seconds, w2};
+use rayon::prelude::*;
+
+const ROUNDS: usize = 5;
+
+fn main() {
+    let scene = w2::scene(|_| ());
+    println!(
+        "field of 2,000 spheres, {} x {}, {} samples, {} bounces, {} threads, {}",
+        scene.size[0],
+        scene.size[1],
+        scene.settings.samples,
+        scene.settings.max_depth,
+        rayon::current_num_threads(),
+        scene.accel.info()
+    );
+    match &scene.accel {
+        Accel::Embree(query) => measure(&scene, query),
+        Accel::Brute(_) => unreachable!("Embree is the default"),
+    }
+    against_pov(&scene);
+    against_mitsuba(&scene);
+}
+
+/// Times of POV-Ray and ours by turns. Light passes clear glass there, which it does here with
+/// `shadows = "tinted"`; by default, glass hides. It renders 2 × 2 pixels for each of ours.
+fn against_pov(opaque: &Scene) {
+    const PEER_ROUNDS: usize = 3;
+    let size = opaque.size.map(|x| 2 * x);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("field.pov");
+    std::fs::write(&file, peers::pov(size)).expect("the folder is ours");
+    let tinted = w2::scene(|desc| desc.settings.shadows = Shadows::Tinted);
+    let ours = |scene: &Scene| {
+        seconds(&|| drop(std::hint::black_box(render(scene, &RenderJob::default(), &()))))
+    };
+    let mut rounds = Vec::new();
+    for _ in 0..PEER_ROUNDS {
+        match peers::time_pov(&file, size) {
+            Ok(theirs) => rounds.push([theirs, ours(&tinted), ours(opaque)]),
+            Err(reason) => return println!("no comparison with POV-Ray: {reason}"),
+        }
+    }
+    let time = |i: usize| median(rounds.iter().map(|r| r[i]).collect());
+    let ratio = |i: usize| median(rounds.iter().map(|r| r[0] / r[i]).collect());
+    println!("POV-Ray traces for {:.2} s", time(0));
+    println!("POV-Ray / ours, glass lets light through: {:.2} ({:.2} s)", ratio(1), time(1));
+    println!("POV-Ray / ours, our glass hides: {:.2} ({:.2} s)", ratio(2), time(2));
+}
+
+/// Mitsuba follows one ray at each surface of glass, and light between diffuse surfaces: what can be
+/// compared is the time for 4 samples, and that for an equal error, each against its own reference.
+fn against_mitsuba(scene: &Scene) {
+    let mut best: Option<(&str, peers::Mitsuba)> = None;
+    for variant in ["llvm_ad_rgb", "scalar_rgb"] {
+        // The estimator is the same.
+        match peers::run_mitsuba(variant, scene.size, best.is_none()) {
+            Ok(theirs) => {
+                println!(
+                    "Mitsuba {} {variant}: {:.2} s for 4 samples",
+                    theirs.version, theirs.seconds
+                );
+                if best.as_ref().is_none_or(|(_, known)| theirs.seconds < known.seconds) {
+                    let known = best.map(|(_, known)| (known.rel_mse, known.reference_samples));
+                    let (rel_mse, reference_samples) =
+                        known.unwrap_or((theirs.rel_mse, theirs.reference_samples));
+                    best = Some((variant, peers::Mitsuba { rel_mse, reference_samples, ..theirs }));
+                }
+            }
+            Err(reason) => println!("no comparison with Mitsuba's {variant}: {reason}"),
+        }
+    }
+    let Some((variant, theirs)) = best else { return };
+    let rendered = |samples, seed| -> Picture {
+        let scene = w2::scene(|desc| {
+            desc.image.size = scene.size.map(|x| x / 2);
+            desc.settings.samples = samples;
+        });
+        render(&scene, &RenderJob { seed, ..RenderJob::default() }, &()).film.into()
+    };
+    let reference = rendered(theirs.reference_samples, 1);
+    let error = compare(&rendered(4, 0), &reference, &CompareOptions::default());
+    let error = error.expect("the same pixels").rel_mse;
+    let ours = (0..3).map(|_| {
+        seconds(&|| drop(std::hint::black_box(render(scene, &RenderJob::default(), &()))))
+    });
+    let ours = ours.fold(f64::INFINITY, f64::min);
+    println!(
+        "relMSE of 4 samples against {} of the same renderer: ours {error:.3e}, Mitsuba's {:.3e}",
+        theirs.reference_samples, theirs.rel_mse
+    );
+    println!(
+        "Mitsuba {variant} / ours, 4 samples each: {:.2}; for our error (relMSE falls as 1 / samples): \
+         {:.1} s, {:.1} times as long",
+        theirs.seconds / ours,
+        theirs.seconds * theirs.rel_mse / error,
+        theirs.seconds * theirs.rel_mse / error / ours
+    );
+}
+
+fn measure<Q: RayQuery>(scene: &Scene, query: &Q) {
+    let (queries, counts) = record(scene, query);
+    println!(
+        "{} camera, {} shadow, {} reflection, {} refraction rays; {:.1} % in packets",
+        counts.camera,
+        counts.shadow,
+        counts.reflection,
+        counts.refraction,
+        100.0 * queries.iter().map(Query::in_packet).sum::<u64>() as f64 / counts.total() as f64
+    );
+    let whole = || {
+        std::hint::black_box(render(scene, &RenderJob::default(), &()));
+    };
+    let replay = || {
+        queries.par_chunks(4096).for_each(|queries| queries.iter().for_each(|q| q.run(query)));
+    };
+    let singles = || {
+        queries
+            .par_chunks(4096)
+            .for_each(|queries| queries.iter().for_each(|q| q.run_single(query)));
+    };
+    let works: [(&str, &dyn Fn()); 3] =
+        [("whole render", &whole), ("its queries", &replay), ("one by one", &singles)];
+    let rounds: Vec<[f64; 3]> =
+        (0..=ROUNDS).map(|_| works.map(|(_, work)| seconds(work))).skip(1).collect();
+    for (i, (name, _)) in works.iter().enumerate() {
+        let time = median(rounds.iter().map(|r| r[i]).collect());
+        let speed = counts.total() as f64 / time / 1e6;
+        println!("{name:>14}  {time:6.2} s  {speed:6.1} Mrays/s");
+    }
+    let ratio = |i: usize, j: usize| median(rounds.iter().map(|r| r[i] / r[j]).collect());
+    println!("whole render / its queries: {:.2}", ratio(0, 1));
+    println!("one by one / in packets where it traces packets: {:.2}", ratio(2, 1));
+}
+
+/// A query that was asked.
+enum Query {
+    Closest(Ray),
+    Any(Ray),
+    ClosestBlock(Box<RayBlock>),
+    AnyBlock(Box<RayBlock>),
+}
+
+impl Query {
+    fn in_packet(&self) -> u64 {
+        match self {
+            Self::Closest(_) | Self::Any(_) => 0,
+            Self::ClosestBlock(rays) | Self::AnyBlock(rays) => rays.active().count_ones().into(),
+        }
+    }
+
+    fn run(&self, query: &impl RayQuery) {
+        match self {
+            Self::Closest(ray) => drop(std::hint::black_box(query.intersect(ray))),
+            Self::Any(ray) => _ = std::hint::black_box(query.occluded(ray)),
+            Self::ClosestBlock(rays) => drop(std::hint::black_box(query.intersect_block(rays))),
+            Self::AnyBlock(rays) => _ = std::hint::black_box(query.occluded_block(rays)),
+        }
+    }
+
+    fn run_single(&self, query: &impl RayQuery) {
+        match self {
+            Self::Closest(_) | Self::Any(_) => self.run(query),
+            Self::ClosestBlock(rays) => rays.lanes().for_each(|lane| {
+                let _ = std::hint::black_box(query.intersect(&rays.get(lane)));
+            }),
+            Self::AnyBlock(rays) => rays.lanes().for_each(|lane| {
+                let _ = std::hint::black_box(query.occluded(&rays.get(lane)));
+            }),
+        }
+    }
+}
+
+/// Answers queries and writes them down.
+struct Recorder<'a, Q> {
+    query: &'a Q,
+    asked: Mutex<Vec<Query>>,
+}
+
+impl<Q> Recorder<'_, Q> {
+    fn note(&self, query: Query) {
+        self.asked.lock().expect("no thread panicked").push(query);
+    }
+}
+
+impl<Q: RayQuery> RayQuery for Recorder<'_, Q> {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.note(Query::Closest(*ray));
+        self.query.intersect(ray)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.note(Query::Any(*ray));
+        self.query.occluded(ray)
+    }
+
+    fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
+        self.note(Query::ClosestBlock(Box::new(rays.clone())));
+        self.query.intersect_block(rays)
+    }
+
+    fn occluded_block(&self, rays: &RayBlock) -> u16 {
+        self.note(Query::AnyBlock(Box::new(rays.clone())));
+        self.query.occluded_block(rays)
+    }
+}
+
+/// All queries of the render, in the order of its blocks.
+fn record<Q: RayQuery>(scene: &Scene, query: &Q) -> (Vec<Query>, RayCounts) {
+    let whitted = Whitted::<Tree>::new(Some(scene.settings.max_depth));
+    let mut all = Vec::new();
+    let mut total = RayCounts::default();
+    for sample in 0..scene.settings.samples {
+        let blocks = camera_blocks(scene, sample);
+        let parts: Vec<_> = blocks
+            .par_chunks(64)
+            .map(|blocks| {
+                let recorder = Recorder { query, asked: Mutex::default() };
+                let mut counts = RayCounts::default();
+                for (rays, samplers) in blocks {
+                    counts.camera += u64::from(rays.active().count_ones());
+                    let hits = recorder.intersect_block(rays);
+                    let camera = CameraBlock { rays, hits: &hits, samplers };
+                    std::hint::black_box(whitted.shade(scene, &recorder, &camera, &mut counts));
+                }
+                (recorder.asked.into_inner().expect("no thread panicked"), counts)
+            })
+            .collect();
+        for (queries, counts) in parts {
+            all.extend(queries);
+            total.add(&counts);
+        }
+    }
+    (all, total)
+}

@@ -1,0 +1,348 @@
+//! The recursive ray tree: the lecture's shading equation at every hit, and from mirrors and glass one
+//! or two rays more.
+//!
+//! Source: Whitted, *An Improved Illumination Model for Shaded Display*, CACM 23(6) 1980.
+//!
+//! The tree is walked with a stack of its own, so no depth overflows the thread's. First hits are
+//! shaded as a block: their shadow rays towards one light run close together and are traced in packets.
+//! So are the rays that a block sends off a flat mirror or through a flat pane; rays off curved surfaces
+//! spread, and are traced one by one, depth first.
+//!
+//! It is compiled three times ([`Features`]), so that a scene without mirrors, or with nothing but
+//! mirrors, glass and lamps, runs code that knows of nothing else.
+
+mod light;
+mod scatter;
+mod shadow;
+
+use std::marker::PhantomData;
+
+use super::{CameraBlock, Integrator, RayCounts};
+use crate::accel::{Hit, HitBlock, LANES, RayQuery};
+use crate::color::Rgb;
+use crate::material::Material;
+use crate::math::Ray;
+use crate::medium::{Interior, beer_lambert};
+use crate::sampler::Sampler;
+use crate::scene::{Cone, Scene, SurfacePoint};
+use scatter::Way;
+
+/// What a compiled variant knows of.
+pub trait Features: Send + Sync + 'static {
+    /// Mirrored and refracted rays.
+    const TREE: bool;
+    /// Textures, area lights, many lights, glowing surfaces, fog, light through glass, dispersion.
+    const EVERYTHING: bool;
+    /// What is kept of up to `N` hits for textures: nothing where there are none.
+    type Textured<const N: usize>: TexturedHits;
+}
+
+/// What textures make of hits, by lane.
+pub trait TexturedHits {
+    /// Nothing yet.
+    fn none() -> Self;
+    /// Notes how wide the ray is at its hit, and the material if textures changed it.
+    fn set(&mut self, lane: usize, cone: Cone, material: Option<Material>);
+    /// The material that textures made.
+    fn material(&self, lane: usize) -> Option<&Material>;
+    /// How wide the ray is there.
+    fn cone(&self, lane: usize) -> Cone;
+}
+
+/// A scene without textures.
+impl TexturedHits for () {
+    #[inline]
+    fn none() {}
+    #[inline]
+    fn set(&mut self, _lane: usize, _cone: Cone, _material: Option<Material>) {}
+    #[inline]
+    fn material(&self, _lane: usize) -> Option<&Material> {
+        None
+    }
+    #[inline]
+    fn cone(&self, _lane: usize) -> Cone {
+        Cone::default()
+    }
+}
+
+impl<const N: usize> TexturedHits for [(Cone, Option<Material>); N] {
+    #[inline]
+    fn none() -> Self {
+        std::array::from_fn(|_| (Cone::default(), None))
+    }
+    #[inline]
+    fn set(&mut self, lane: usize, cone: Cone, material: Option<Material>) {
+        self[lane] = (cone, material);
+    }
+    #[inline]
+    fn material(&self, lane: usize) -> Option<&Material> {
+        self[lane].1.as_ref()
+    }
+    #[inline]
+    fn cone(&self, lane: usize) -> Cone {
+        self[lane].0
+    }
+}
+
+/// Lamps, diffuse and shiny surfaces: camera and shadow rays.
+#[derive(Debug, Clone, Copy)]
+pub struct Local;
+
+/// With mirrors and glass.
+#[derive(Debug, Clone, Copy)]
+pub struct Tree;
+
+/// With all there is.
+#[derive(Debug, Clone, Copy)]
+pub struct Everything;
+
+impl Features for Local {
+    const TREE: bool = false;
+    const EVERYTHING: bool = false;
+    type Textured<const N: usize> = ();
+}
+
+impl Features for Tree {
+    const TREE: bool = true;
+    const EVERYTHING: bool = false;
+    type Textured<const N: usize> = ();
+}
+
+impl Features for Everything {
+    const TREE: bool = true;
+    const EVERYTHING: bool = true;
+    type Textured<const N: usize> = [(Cone, Option<Material>); N];
+}
+
+/// The ray tree, in the variant `F`.
+#[derive(Debug, Clone, Copy)]
+pub struct Whitted<F> {
+    max_depth: Option<u32>,
+    features: PhantomData<F>,
+}
+
+impl<F> Whitted<F> {
+    /// A tree of at most `max_depth` bounces: 0 is the camera ray and its direct light. None for local
+    /// illumination, which knows of no bounces that it would miss.
+    pub const fn new(max_depth: Option<u32>) -> Self {
+        Self { max_depth, features: PhantomData }
+    }
+}
+
+/// A ray of the tree.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    ray: Ray,
+    /// What its radiance counts for in the pixel.
+    throughput: Rgb,
+    /// The media that it is inside of.
+    interior: Interior,
+    /// Numbers for this node alone.
+    sampler: Sampler,
+    /// How wide it is, for textures.
+    cone: Cone,
+    /// The one wavelength that it carries, in nm; 0 while it carries all.
+    wavelength: f32,
+    /// Bounces before it.
+    depth: u32,
+    /// Surfaces between equal media that it has passed straight.
+    passed: u32,
+    /// Which pixel of the block it belongs to.
+    lane: u32,
+    /// How it left its parent.
+    way: Way,
+}
+
+/// Rays of several lanes that run close together, and what they hit.
+struct Block {
+    /// By lane.
+    nodes: [Node; LANES],
+    hits: HitBlock,
+    active: u16,
+}
+
+/// The surfaces that up to `N` rays hit, by lane.
+struct Hits<'s, F: Features, const N: usize> {
+    points: [Option<SurfacePoint<'s>>; N],
+    /// What light that leaves the surface towards the ray counts for in the pixel.
+    weights: [Rgb; N],
+    textured: F::Textured<N>,
+}
+
+impl<'s, F: Features, const N: usize> Hits<'s, F, N> {
+    #[inline]
+    fn none() -> Self {
+        let textured = F::Textured::<N>::none();
+        Self { points: [const { None }; N], weights: [Rgb::BLACK; N], textured }
+    }
+
+    /// Point and material of a lane that hit something.
+    #[inline]
+    fn get(&self, lane: usize) -> Option<(&SurfacePoint<'s>, &Material)> {
+        let point = self.points[lane].as_ref()?;
+        Some((point, self.textured.material(lane).unwrap_or(point.material)))
+    }
+}
+
+/// The walk through the trees of a block.
+struct Walk<'a, Q, F> {
+    scene: &'a Scene,
+    query: &'a Q,
+    max_depth: Option<u32>,
+    camera: &'a CameraBlock<'a>,
+    counts: &'a mut RayCounts,
+    /// Single rays to be traced.
+    stack: Vec<Node>,
+    /// Blocks that have been traced, to be shaded.
+    blocks: Vec<Block>,
+    radiance: [Rgb; LANES],
+    features: PhantomData<F>,
+}
+
+impl<F: Features> Integrator for Whitted<F> {
+    fn shade<Q: RayQuery>(
+        &self,
+        scene: &Scene,
+        query: &Q,
+        camera: &CameraBlock<'_>,
+        counts: &mut RayCounts,
+    ) -> [Rgb; LANES] {
+        let mut walk = Walk::<Q, F> {
+            scene,
+            query,
+            max_depth: self.max_depth,
+            camera,
+            counts,
+            stack: Vec::new(),
+            blocks: Vec::new(),
+            radiance: [Rgb::BLACK; LANES],
+            features: PhantomData,
+        };
+        let node = |lane: usize| {
+            let ray = camera.rays.get(lane);
+            Node {
+                cone: if F::EVERYTHING { Cone::of_pixel(scene, &ray) } else { Cone::default() },
+                ray,
+                throughput: Rgb::splat(1.0),
+                interior: if F::TREE { scene.camera_interior } else { Interior::OUTSIDE },
+                sampler: camera.samplers[lane],
+                wavelength: 0.0,
+                depth: 0,
+                passed: 0,
+                lane: lane as u32,
+                way: Way::Refracted,
+            }
+        };
+        let seen = if F::EVERYTHING && scene.fog.is_some() {
+            walk.before_the_scene(&node)
+        } else {
+            [Rgb::splat(1.0); LANES]
+        };
+        let node = |lane: usize| Node { throughput: seen[lane], ..node(lane) };
+        walk.shade::<LANES>(camera.rays.active(), |lane| camera.hits.get(lane), node);
+        if F::TREE {
+            walk.run();
+        }
+        for lane in (0..LANES).filter(|lane| camera.rays.active() >> lane & 1 == 0) {
+            walk.radiance[lane] = scene.background;
+        }
+        walk.radiance
+    }
+}
+
+impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
+    /// Traces and shades what is left, depth first.
+    fn run(&mut self) {
+        loop {
+            while let Some(node) = self.stack.pop() {
+                let hit = self.query.intersect(&node.ray);
+                self.shade::<1>(1, |_| hit.as_ref(), |_| node);
+            }
+            let Some(block) = self.blocks.pop() else { return };
+            self.shade::<LANES>(
+                block.active,
+                |lane| block.hits.get(lane),
+                |lane| block.nodes[lane],
+            );
+        }
+    }
+
+    /// Adds the light of the hits of up to `N` rays to their pixels, and sends their children on.
+    #[inline]
+    fn shade<'h, const N: usize>(
+        &mut self,
+        active: u16,
+        hit: impl Fn(usize) -> Option<&'h Hit>,
+        node: impl Fn(usize) -> Node,
+    ) {
+        let scene = self.scene;
+        let mut hits = Hits::<F, N>::none();
+        for lane in (0..N).filter(|lane| active >> lane & 1 == 1) {
+            let node = node(lane);
+            let hit = hit(lane);
+            let weight = self.through_media(&node, hit.map_or(f32::INFINITY, |hit| hit.t));
+            let Some(hit) = hit else {
+                self.counts.ends.miss += 1;
+                self.radiance[node.lane as usize] += weight * scene.background;
+                continue;
+            };
+            hits.weights[lane] = weight;
+            let point = hits.points[lane].insert(scene.surface(&node.ray, hit));
+            if F::EVERYTHING {
+                if scene.has_maps() {
+                    let cone = scene.widened(node.cone, hit);
+                    let material = scene.apply_maps(hit, cone.width, point);
+                    hits.textured.set(lane, cone, material);
+                }
+                self.radiance[node.lane as usize] += weight * scene.emission(point);
+            }
+            if let Some((_, material)) = hits.get(lane)
+                && material.is_lit()
+            {
+                self.radiance[node.lane as usize] += weight * material.ambient() * scene.ambient;
+            }
+        }
+        self.light(&hits, &node);
+        if F::TREE && self.max_depth.is_some() {
+            self.scatter(&hits, &node);
+        }
+    }
+
+    /// What is left of the light of each camera ray on its way through fog from the scene to a far
+    /// camera, where rays do not start at it; the fog's own light is added to the pixels.
+    fn before_the_scene(&mut self, node: &impl Fn(usize) -> Node) -> [Rgb; LANES] {
+        let eye = self.scene.camera.pose().eye;
+        std::array::from_fn(|lane| {
+            let is_active = self.camera.rays.active() >> lane & 1 == 1;
+            let ray = self.camera.rays.get(lane);
+            let distance = (ray.origin.as_dvec3() - eye).dot(ray.direction.as_dvec3()) as f32;
+            let is_far = self.scene.camera.is_far();
+            if !is_active || !is_far || distance <= 0.0 {
+                return Rgb::splat(1.0);
+            }
+            let from_camera = Node { ray: Ray::new(eye.as_vec3(), ray.direction), ..node(lane) };
+            self.through_media(&from_camera, distance)
+        })
+    }
+
+    /// The throughput of a ray after `distance`, in the media that it runs through; fog's own light is
+    /// added to the pixel.
+    #[inline]
+    fn through_media(&mut self, node: &Node, distance: f32) -> Rgb {
+        let mut throughput = node.throughput;
+        if F::TREE && !node.interior.is_outside() {
+            if let Some(medium) = self.scene.medium(node.interior)
+                && !medium.absorption.is_black()
+            {
+                throughput *= beer_lambert(medium.absorption, distance);
+            }
+        } else if F::EVERYTHING
+            && let Some(fog) = &self.scene.fog
+        {
+            let transmittance = fog.transmittance(&node.ray, distance);
+            self.radiance[node.lane as usize] += throughput * fog.in_scattered(transmittance);
+            throughput *= transmittance;
+        }
+        throughput
+    }
+}

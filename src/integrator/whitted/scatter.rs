@@ -1,0 +1,234 @@
+//! From a hit to the next rays of the tree: mirrored and refracted directions, their weights, and the
+//! rules by which a branch ends.
+
+use glam::Vec3;
+
+use super::{Block, Features, Hits, Node, TexturedHits, Walk};
+use crate::accel::{LANES, RayBlock, RayQuery};
+use crate::color::{Rgb, Wavelength};
+use crate::material::{Dielectric, FresnelModel, Material, fresnel};
+use crate::medium::Interior;
+use crate::sampler::Dimensions;
+use crate::scene::SurfacePoint;
+
+/// Surfaces between equal media that a ray passes at most.
+const MAX_PASSED: u32 = 1 << 12;
+
+/// Fewer rays than this are traced one by one.
+const MIN_PACKET: usize = 6;
+
+/// Directions run close together where the cosine between them is above this.
+const COHERENT_COSINE: f32 = 0.99;
+
+/// The first of the two branches of a node's sampler that its children take; its lights take others.
+const BRANCHES: u32 = 1 << 30;
+
+/// Which of a hit's two rays one is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    Mirrored,
+    Refracted,
+}
+
+impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
+    /// Sends the rays of all specular hits on: they wait on the stack, but for those of a block that
+    /// run close together, which are traced as one.
+    #[inline]
+    pub(super) fn scatter<const N: usize>(
+        &mut self,
+        hits: &Hits<'_, F, N>,
+        node: &impl Fn(usize) -> Node,
+    ) {
+        let before = self.stack.len();
+        for lane in 0..N {
+            self.children(hits, node, lane);
+        }
+        if N == LANES && self.stack.len() - before >= MIN_PACKET {
+            self.gather(before);
+        }
+    }
+
+    /// Traces the nodes of the stack from `start` on as blocks where they run close together.
+    fn gather(&mut self, start: usize) {
+        let nodes: Vec<Node> = self.stack.drain(start..).collect();
+        for way in [Way::Refracted, Way::Mirrored] {
+            let group = || nodes.iter().filter(move |node| node.way == way);
+            let Some(first) = group().next() else { continue };
+            let is_close = |n: &Node| n.ray.direction.dot(first.ray.direction) > COHERENT_COSINE;
+            if group().count() < MIN_PACKET || !group().all(is_close) {
+                self.stack.extend(group());
+                continue;
+            }
+            let mut rays = RayBlock::empty();
+            let mut by_lane = [*first; LANES];
+            for node in group() {
+                rays.set(node.lane as usize, &node.ray);
+                by_lane[node.lane as usize] = *node;
+            }
+            let hits = self.query.intersect_block(&rays);
+            self.blocks.push(Block { nodes: by_lane, hits, active: rays.active() });
+        }
+    }
+
+    /// The rays that go on from the hit of a lane; none where it has no hit or sends no rays on.
+    #[inline]
+    fn children<const N: usize>(
+        &mut self,
+        hits: &Hits<'_, F, N>,
+        node: &impl Fn(usize) -> Node,
+        lane: usize,
+    ) {
+        let Some((point, material)) = hits.get(lane) else { return };
+        if !material.is_specular() {
+            self.counts.ends.diffuse += 1;
+            return;
+        }
+        let parent =
+            Node { throughput: hits.weights[lane], cone: hits.textured.cone(lane), ..node(lane) };
+        let d = parent.ray.direction;
+        // A shading normal that faces away from the ray says nothing of its mirror image.
+        let n = if point.normal.dot(d) < 0.0 { point.normal } else { point.geometric_normal };
+        if let Material::Dielectric(glass) = material {
+            self.through_surface(&parent, point, n, glass);
+            return;
+        }
+        let weight = parent.throughput * material.mirrored(-d.dot(n));
+        self.mirrored(&parent, point, n, weight);
+    }
+
+    /// The ray that a surface mirrors.
+    #[inline]
+    fn mirrored(&mut self, parent: &Node, point: &SurfacePoint<'_>, n: Vec3, weight: Rgb) {
+        let d = parent.ray.direction;
+        let mut direction = fresnel::reflect(d, n);
+        // An interpolated or mapped normal may send it into the surface.
+        if direction.dot(point.geometric_normal) <= 0.0 {
+            direction = fresnel::reflect(d, point.geometric_normal);
+        }
+        let parent = Node { cone: parent.cone.turned(2.0), ..*parent };
+        self.child(&parent, point, direction, weight, parent.interior, Way::Mirrored);
+    }
+
+    /// The two rays of a surface between two media: of glass and air, of two glasses, or of one
+    /// that another of higher priority fills, where the ray passes straight.
+    #[inline]
+    fn through_surface(
+        &mut self,
+        parent: &Node,
+        point: &SurfacePoint<'_>,
+        n: Vec3,
+        glass: &Dielectric,
+    ) {
+        let scene = self.scene;
+        let d = parent.ray.direction;
+        let crossing = scene.crossing(parent.interior, point.material_index, point.is_front);
+        if crossing.is_same() {
+            self.passing(parent, point, crossing.beyond);
+            return;
+        }
+        // Where media disperse, a ray carries one wavelength from here on.
+        let splits = F::EVERYTHING && parent.wavelength == 0.0 && crossing.is_dispersive(scene);
+        let (wavelength, color) =
+            if splits { self.wavelength(parent) } else { (parent.wavelength, Rgb::splat(1.0)) };
+        let [n_i, n_t] = crossing.indices(scene, wavelength);
+        if n_i == n_t && !splits && !matches!(glass.fresnel, FresnelModel::Power(_)) {
+            // Other media, perhaps with other absorption, but light takes no notice of the surface.
+            self.passing(parent, point, crossing.beyond);
+            return;
+        }
+        let bent = fresnel::refract(d, n, n_t / n_i);
+        let one = Node { wavelength, throughput: parent.throughput * color, ..*parent };
+
+        // But where it enters the denser medium nothing is reflected totally: the mirrored ray goes on
+        // with all wavelengths, by the share of the mean index, and the other has the rest.
+        let keeps_all = splits && n_i < n_t;
+        let [f_i, f_t] = if keeps_all { crossing.indices(scene, 0.0) } else { [n_i, n_t] };
+        let by_mean = if keeps_all { fresnel::refract(d, n, f_t / f_i) } else { bent };
+        let reflected = match &by_mean {
+            None => 1.0,
+            Some(bent) => glass.fresnel.dielectric(bent.cos_i, bent.cos_t, f_i, f_t),
+        };
+        let from = if keeps_all { parent } else { &one };
+        self.mirrored(from, point, n, from.throughput * reflected);
+        let Some(bent) = bent else { return };
+
+        let mut direction = bent.direction;
+        // As with mirrors, the surface itself decides.
+        if direction.dot(point.geometric_normal) >= 0.0 {
+            direction = fresnel::refract(d, point.geometric_normal, n_t / n_i)
+                .map_or(d, |bent| bent.direction);
+        }
+        let share = one.throughput * (1.0 - reflected);
+        let one = Node { cone: one.cone.turned((1.0 - n_i / n_t).abs()), ..one };
+        self.child(&one, point, direction, share, crossing.beyond, Way::Refracted);
+    }
+
+    /// The ray that goes straight on, through a surface that is none.
+    fn passing(&mut self, parent: &Node, point: &SurfacePoint<'_>, beyond: Interior) {
+        if parent.passed == MAX_PASSED {
+            self.counts.ends.depth += 1;
+            return;
+        }
+        self.counts.refraction += 1;
+        let ray = self.scene.spawn(point, parent.ray.direction, f32::INFINITY);
+        let (passed, way) = (parent.passed + 1, Way::Refracted);
+        let cone = parent.cone.turned(0.0);
+        self.stack.push(Node { ray, interior: beyond, passed, way, cone, ..*parent });
+    }
+
+    /// The one wavelength of a sample, in nm, and the colour that it counts for.
+    fn wavelength(&self, node: &Node) -> (f32, Rgb) {
+        if let Some(wavelength) = self.scene.settings.wavelength {
+            return (wavelength as f32, Rgb::splat(1.0));
+        }
+        // One for the whole tree: its branches meet in the same pixel.
+        let [u, ..] = self.camera.samplers[node.lane as usize].four(Dimensions::Spectrum);
+        let wavelength = Wavelength::sample(u);
+        (wavelength.nanometres(), wavelength.rgb_weight())
+    }
+
+    /// Puts the next ray of a branch on the stack, if none of the rules ends it.
+    #[inline]
+    fn child(
+        &mut self,
+        parent: &Node,
+        point: &SurfacePoint<'_>,
+        direction: Vec3,
+        mut throughput: Rgb,
+        interior: Interior,
+        way: Way,
+    ) {
+        let settings = &self.scene.settings;
+        let weight = throughput.max_component();
+        // What does not count at all was no branch. Also refuses NaN.
+        if !(weight > 0.0) {
+            return;
+        }
+        if parent.depth >= self.max_depth.unwrap_or(0) {
+            self.counts.ends.depth += 1;
+            return;
+        }
+        let sampler = parent.sampler.branch(BRANCHES + way as u32);
+        if weight < settings.prune {
+            if !settings.roulette {
+                self.counts.ends.prune += 1;
+                return;
+            }
+            // It goes on with a probability in proportion to its weight, and stands for those that ended.
+            let survival = weight / settings.prune;
+            let [u, ..] = sampler.four(Dimensions::Roulette);
+            if u >= survival {
+                self.counts.ends.roulette += 1;
+                return;
+            }
+            throughput *= 1.0 / survival;
+        }
+        match way {
+            Way::Mirrored => self.counts.reflection += 1,
+            Way::Refracted => self.counts.refraction += 1,
+        }
+        let ray = self.scene.spawn(point, direction, f32::INFINITY);
+        let depth = parent.depth + 1;
+        self.stack.push(Node { ray, throughput, interior, sampler, depth, way, ..*parent });
+    }
+}
