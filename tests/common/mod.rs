@@ -6,6 +6,8 @@
     reason = "not every program uses everything"
 )]
 
+pub mod optics;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
