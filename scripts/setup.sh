@@ -3,7 +3,8 @@
 # newer. Idempotent, and quick when nothing is missing.
 #
 #   scripts/setup.sh build   C compiler, libclang (for bindgen), Embree 4
-#   scripts/setup.sh test    the same, and the EXR tools that the tests read our files with
+#   scripts/setup.sh test    the same, the EXR tools that the tests read our files with, and POV-Ray,
+#                            with whose pictures they compare ours
 #
 # Embree comes from, in this order: EMBREE_DIR, the project's own prefix (.embree), the system.
 # Where the distribution's Embree is older than 4 (Debian 12), Debian 13's is unpacked into the
@@ -122,6 +123,7 @@ if [ "$stage" = test ]; then
     missing=
     command -v exrheader >/dev/null 2>&1 || missing="$missing openexr"
     command -v oiiotool >/dev/null 2>&1 || missing="$missing openimageio-tools"
+    command -v povray >/dev/null 2>&1 || missing="$missing povray"
     # shellcheck disable=SC2086  # a list of package names
     install_packages $missing
 fi
