@@ -439,3 +439,51 @@ fn ambient_occlusion_is_the_share_that_is_seen() {
     desc.settings.ao_distance = Some(1e-4);
     assert_eq!(seen(&desc).r, 1.0);
 }
+
+/// A turned copy of a glowing ball is a ball still, and lights a floor as E = L·A/d² at a distance.
+#[test]
+fn turned_copies_of_glowing_balls_shine() {
+    let mut desc = one_ray(DVec3::new(0.0, 1.0, 0.0), DVec3::ZERO);
+    desc.settings.samples = 16;
+    white(&mut desc);
+    add_mesh(&mut desc, floor(3.0), "white");
+    let black = Material::Diffuse { reflectance: Rgb::BLACK };
+    let emission = Rgb::splat(5.0);
+    desc.materials.push(MaterialDesc { emission, ..MaterialDesc::new("lamp", black) });
+    let ball = ShapeDesc::Sphere { center: DVec3::ZERO, radius: 0.1 };
+    let objects = vec![ObjectDesc::new(ball, Some("lamp"))];
+    let at = Default::default();
+    desc.prototypes.push(PrototypeDesc { name: "lamps".into(), at, objects });
+    let turn = DAffine3::from_rotation_x(0.3) * DAffine3::from_rotation_z(1.1);
+    let transforms = vec![DAffine3::from_translation(DVec3::Y * 4.0) * turn];
+    let copies = ShapeDesc::Instances { prototype: Reference::new("lamps"), transforms };
+    desc.objects.push(ObjectDesc::new(copies, None));
+    // Radiance of the floor: E/π = L·(r/d)².
+    let expected = 5.0 * (0.1f64 / 4.0).powi(2);
+    let got = f64::from(seen(&desc).r);
+    assert!((got / expected - 1.0).abs() < 1e-3, "{got} {expected}");
+}
+
+/// Two panes between a lamp with an area and the floor do not make the lamp shadow itself.
+#[test]
+fn a_lamp_behind_panes_is_not_in_its_own_light() {
+    let mut desc = one_ray(DVec3::new(0.0, 0.5, 0.0), DVec3::ZERO);
+    desc.settings.samples = 64;
+    desc.settings.shadows = Shadows::Tinted;
+    white(&mut desc);
+    add_mesh(&mut desc, floor(80.0), "white");
+    add_material(&mut desc, "pane", Material::Dielectric(glass(1.5)));
+    for y in [1.0, 1.3] {
+        let pane = block(DVec3::new(-80.0, y, -80.0), DVec3::new(80.0, y + 0.1, 80.0));
+        add_mesh(&mut desc, pane, "pane");
+    }
+    desc.lights.push(LightDesc::Rectangle {
+        corner: DVec3::new(-0.1, 2.0, -0.1),
+        edge_u: DVec3::X * 0.2,
+        edge_v: DVec3::Z * 0.2,
+        radiance: Rgb::splat(10.0),
+    });
+    let expected = 10.0 * 0.04 / 4.0 / std::f64::consts::PI;
+    let got = f64::from(seen(&desc).r);
+    assert!((got / expected - 1.0).abs() < 0.02, "{got} {expected}");
+}

@@ -67,6 +67,16 @@ impl Fog {
             .map(|sigma| if sigma == 0.0 { 1.0 } else { (-f64::from(sigma) * depth).exp() as f32 })
     }
 
+    /// The same where `before` of the ray's way is already accounted for: fog by distance goes on there.
+    pub fn transmittance_after(&self, before: f32, ray: &Ray, distance: f32) -> Rgb {
+        if before > 0.0 && matches!(self.profile, FogProfile::Distance { .. }) {
+            let so_far = self.transmittance(ray, before);
+            let all = self.transmittance(ray, before + distance);
+            return all.zip(so_far, |all, so_far| if so_far > 0.0 { all / so_far } else { 0.0 });
+        }
+        self.transmittance(ray, distance)
+    }
+
     /// What is seen through the first `distance` of `ray` where `behind` is there.
     pub fn seen_through(&self, ray: &Ray, distance: f32, behind: Rgb) -> Rgb {
         let t = self.transmittance(ray, distance);
@@ -87,16 +97,14 @@ impl Fog {
 fn height_integral(y: f64, d: f64, s: f64, h: f64) -> f64 {
     // Distance to the base, where the ray passes it.
     let to_base = if d == 0.0 { f64::INFINITY } else { -y / d };
+    // From its lower end upwards, so that nothing overflows: exp(−y/h)·h/|d|·(1 − exp(−|d|·s/h)), by
+    // expm1 as it cancels for small d.
     let above = |y: f64, s: f64| {
-        // exp(−y/h)·h/d·(1 − exp(−d·s/h)), by expm1 as it cancels for small d.
-        let density = (-y.max(0.0) / h).exp();
-        let x = d / h;
+        let lower = if d < 0.0 { (y + d * s).max(0.0) } else { y };
+        let density = (-lower.max(0.0) / h).exp();
+        let x = d.abs() / h;
         // The density is constant to the last digit.
-        if x == 0.0 || (x * s).abs() < 1e-12 {
-            density * s
-        } else {
-            density * (-(-x * s).exp_m1() / x)
-        }
+        if x == 0.0 || x * s < 1e-12 { density * s } else { density * (-(-x * s).exp_m1() / x) }
     };
     let is_above = y > 0.0 || (y == 0.0 && d > 0.0);
     match (is_above, to_base > 0.0 && to_base < s) {
@@ -163,6 +171,8 @@ mod tests {
         );
         assert_eq!(height_integral(1.0, -0.5, f64::INFINITY, 2.0), f64::INFINITY);
         assert_eq!(height_integral(1.0, 0.0, f64::INFINITY, 2.0), f64::INFINITY);
+        // From high above thin fog: h of it, seen straight down.
+        assert!((height_integral(8.0, -1.0, 8.0, 0.01) - 0.01).abs() < 1e-12);
         // Far below, where the exponential alone would overflow.
         assert_eq!(height_integral(-1e6, 0.0, 3.0, 1e-3), 3.0);
     }

@@ -149,8 +149,13 @@ pub(super) fn glowing_objects(
             Geometry::Spheres(spheres) => {
                 for (i, sphere) in spheres.iter().enumerate() {
                     let Some(emission) = glow(i) else { continue };
-                    let scale = super::place::uniform_scale(&m.matrix3)
-                        .ok_or(SceneError::GlowingEllipsoid { at: Location::default() })?;
+                    // Copies are in f32: even to within its rounding.
+                    let axes = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis];
+                    let scale = m.matrix3.determinant().abs().cbrt();
+                    let is_even = |axis: &DVec3| (axis.length() / scale - 1.0).abs() < 1e-5;
+                    if !axes.iter().all(is_even) {
+                        return Err(SceneError::GlowingEllipsoid { at: Location::default() });
+                    }
                     lights.push(Light::Sphere(SphereLight {
                         center: m.transform_point3(sphere.center),
                         radius: sphere.radius * scale,

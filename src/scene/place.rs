@@ -310,7 +310,7 @@ impl Placer<'_> {
                         }
                     };
                     for (row, transform) in transforms.iter().enumerate() {
-                        if let Err(error) = check_row(transform, row, &object) {
+                        if let Err(error) = check_row(&(m * *transform), row, &object) {
                             self.errors.push(error);
                             break;
                         }
@@ -447,7 +447,7 @@ fn moved(mut mesh: TriangleMesh, transform: &DAffine3, group_origin: DVec3) -> T
 }
 
 /// The common factor of a transform that only rotates, mirrors and scales evenly.
-pub(super) fn uniform_scale(m: &DMat3) -> Option<f64> {
+fn uniform_scale(m: &DMat3) -> Option<f64> {
     let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
     let scale = x.length();
     let near = |value: f64, expected: f64| (value - expected).abs() <= 1e-12 * scale * scale;

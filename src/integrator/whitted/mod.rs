@@ -151,6 +151,8 @@ struct Node {
     lane: u32,
     /// How it left its parent.
     way: Way,
+    /// What of its way lies before its origin, where it did not begin there.
+    before: f32,
 }
 
 /// Rays of several lanes that run close together, and what they hit.
@@ -231,6 +233,7 @@ impl<F: Features> Integrator for Whitted<F> {
                 passed: 0,
                 lane: lane as u32,
                 way: Way::Refracted,
+                before: if F::EVERYTHING { way_before(scene, &camera.rays.get(lane)) } else { 0.0 },
             }
         };
         let seen = if F::EVERYTHING && scene.fog.is_some() {
@@ -311,17 +314,16 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// What is left of the light of each camera ray on its way through fog from the scene to a far
     /// camera, where rays do not start at it; the fog's own light is added to the pixels.
     fn before_the_scene(&mut self, node: &impl Fn(usize) -> Node) -> [Rgb; LANES] {
-        let eye = self.scene.camera.pose().eye;
         std::array::from_fn(|lane| {
             let is_active = self.camera.rays.active() >> lane & 1 == 1;
-            let ray = self.camera.rays.get(lane);
-            let distance = (ray.origin.as_dvec3() - eye).dot(ray.direction.as_dvec3()) as f32;
-            let is_far = self.scene.camera.is_far();
-            if !is_active || !is_far || distance <= 0.0 {
+            let node = node(lane);
+            if !is_active || node.before <= 0.0 {
                 return Rgb::splat(1.0);
             }
-            let from_camera = Node { ray: Ray::new(eye.as_vec3(), ray.direction), ..node(lane) };
-            self.through_media(&from_camera, distance)
+            let (o, d) = (node.ray.origin.as_dvec3(), node.ray.direction.as_dvec3());
+            let start = (o - d * f64::from(node.before)).as_vec3();
+            let ray = Ray::new(start, node.ray.direction);
+            self.through_media(&Node { ray, before: 0.0, ..node }, node.before)
         })
     }
 
@@ -339,10 +341,19 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         } else if F::EVERYTHING
             && let Some(fog) = &self.scene.fog
         {
-            let transmittance = fog.transmittance(&node.ray, distance);
+            let transmittance = fog.transmittance_after(node.before, &node.ray, distance);
             self.radiance[node.lane as usize] += throughput * fog.in_scattered(transmittance);
             throughput *= transmittance;
         }
         throughput
     }
+}
+
+/// How far a far camera's ray has come when it starts at the scene's box.
+fn way_before(scene: &Scene, ray: &Ray) -> f32 {
+    if !scene.camera.is_far() {
+        return 0.0;
+    }
+    let from_eye = ray.origin.as_dvec3() - scene.camera.pose().eye;
+    from_eye.dot(ray.direction.as_dvec3()).max(0.0) as f32
 }

@@ -141,8 +141,9 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
 
         // But where it enters the denser medium nothing is reflected totally: the mirrored ray goes on
         // with all wavelengths, by the share of the mean index, and the other has the rest.
-        let keeps_all = splits && n_i < n_t;
-        let [f_i, f_t] = if keeps_all { crossing.indices(scene, 0.0) } else { [n_i, n_t] };
+        let mean = if splits { crossing.indices(scene, 0.0) } else { [n_i, n_t] };
+        let keeps_all = splits && n_i < n_t && mean[0] < mean[1];
+        let [f_i, f_t] = if keeps_all { mean } else { [n_i, n_t] };
         let by_mean = if keeps_all { fresnel::refract(d, n, f_t / f_i) } else { bent };
         let reflected = match &by_mean {
             None => 1.0,
@@ -173,7 +174,8 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         let ray = self.scene.spawn(point, parent.ray.direction, f32::INFINITY);
         let (passed, way) = (parent.passed + 1, Way::Refracted);
         let cone = parent.cone.turned(0.0);
-        self.stack.push(Node { ray, interior: beyond, passed, way, cone, ..*parent });
+        let before = parent.before + (point.position - parent.ray.origin).length();
+        self.stack.push(Node { ray, interior: beyond, passed, way, cone, before, ..*parent });
     }
 
     /// The one wavelength of a sample, in nm, and the colour that it counts for.
@@ -229,6 +231,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         }
         let ray = self.scene.spawn(point, direction, f32::INFINITY);
         let depth = parent.depth + 1;
-        self.stack.push(Node { ray, throughput, interior, sampler, depth, way, ..*parent });
+        let before = 0.0;
+        self.stack.push(Node { ray, throughput, interior, sampler, depth, way, before, ..*parent });
     }
 }

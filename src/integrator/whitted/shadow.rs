@@ -68,8 +68,16 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             }
             interior = crossing.beyond;
             self.counts.shadow += 1;
-            // What is left of the way; the offset of the new origin is within the light's own margin.
-            ray = scene.spawn(&point, ray.direction, ray.t_max - hit.t);
+            // What is left of the way to the very end of the ray that was asked for: the new origin has
+            // moved by the hit's distance and by its own offset.
+            let next = scene.spawn(&point, ray.direction, f32::INFINITY);
+            let moved =
+                (next.origin.as_dvec3() - ray.origin.as_dvec3()).dot(ray.direction.as_dvec3());
+            let left = (f64::from(ray.t_max) - moved) as f32;
+            if left <= 0.0 {
+                return Some(share);
+            }
+            ray = Ray { t_max: left * (1.0 - 4.0 * f32::EPSILON), ..next };
         }
         None
     }
