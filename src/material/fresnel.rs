@@ -81,13 +81,19 @@ impl Refraction {
         dielectric(self.cos_i, self.cos_t, self.eta)
     }
 
-    /// [`schlick`]'s approximation to [`reflectance`](Self::reflectance), with the cosine on the side of the
-    /// lower index: the only one that reaches 0 where total reflection begins.
+    /// See [`schlick_dielectric`].
     #[inline]
     pub fn schlick(&self) -> f32 {
-        let r = (1.0 - self.eta) / (1.0 + self.eta);
-        schlick(r * r, if self.eta < 1.0 { self.cos_t } else { self.cos_i })
+        schlick_dielectric(self.cos_i, self.cos_t, self.eta)
     }
+}
+
+/// [`schlick`]'s approximation to [`dielectric`], with the cosine on the side of the lower index: the only
+/// one that reaches 0 where total reflection begins.
+#[inline]
+pub fn schlick_dielectric(cos_i: f32, cos_t: f32, eta: f32) -> f32 {
+    let r = (1.0 - eta) / (1.0 + eta);
+    schlick(r * r, if eta < 1.0 { cos_t } else { cos_i })
 }
 
 /// Fresnel's reflectance of a dielectric for unpolarised light, in [0, 1]. Under total reflection there is

@@ -33,11 +33,7 @@ impl FresnelModel {
     pub fn dielectric(&self, cos_i: f32, cos_t: f32, n_i: f32, n_t: f32) -> f32 {
         match self {
             Self::Exact => fresnel::dielectric(cos_i, cos_t, n_t / n_i),
-            Self::Schlick => {
-                let r0 = (n_i - n_t) / (n_i + n_t);
-                // Schlick's angle is the one in the thinner medium (and there the larger one).
-                fresnel::schlick(r0 * r0, if n_i > n_t { cos_t } else { cos_i })
-            }
+            Self::Schlick => fresnel::schlick_dielectric(cos_i, cos_t, n_t / n_i),
             Self::Power(p) => fresnel::empirical(p.offset, p.scale, p.power, -cos_i),
         }
     }

@@ -99,17 +99,11 @@ impl Scene {
         }
     }
 
-    /// Where rays that leave `point` on the viewer's side start, and the distance from there up to which
-    /// hits are none: what a light is asked for whose points differ.
+    /// Where rays that leave `point` on the viewer's side start: from where a light is asked whose points
+    /// differ in distance.
     #[inline]
-    pub fn departure(&self, point: &SurfacePoint<'_>) -> (Vec3, f32) {
-        match self.settings.epsilon {
-            Epsilon::Auto => {
-                let n = point.geometric_normal;
-                (offset_ray_origin(point.position, point.error, n, n), 0.0)
-            }
-            Epsilon::Fixed(epsilon) => (point.position, epsilon),
-        }
+    pub fn departure(&self, point: &SurfacePoint<'_>) -> Vec3 {
+        self.spawn(point, point.geometric_normal, 0.0).origin
     }
 
     /// The ray that leaves `point` into `direction` (unit length), as far as `distance`.

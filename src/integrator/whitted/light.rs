@@ -48,7 +48,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
                 self.cast::<N>(lit, hits, node, false, |lane| {
                     let sampler = node(lane).sampler.branch(index).split(k, n);
                     let [u, v, ..] = sampler.four(Dimensions::Light);
-                    let (origin, _) = scene.departure(hits.points[lane].as_ref()?);
+                    let origin = scene.departure(hits.points[lane].as_ref()?);
                     Some(scaled(light.sample(origin, [u, v])?, 1.0 / n as f32))
                 });
             }
@@ -62,7 +62,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
                 let [u, v, which, _] = sampler.four(Dimensions::Light);
                 let picked = tree.sample(point.position, Some(point.normal), which)?;
                 let light: &Light = &scene.lights[picked.index as usize];
-                let (origin, _) = scene.departure(point);
+                let origin = scene.departure(point);
                 let sample = light.sample(origin, [u, v])?;
                 Some(scaled(sample, 1.0 / (n as f32 * picked.probability)))
             });
@@ -81,7 +81,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         sample: impl Fn(usize) -> Option<LightSample>,
     ) {
         let scene = self.scene;
-        let in_packets = N == LANES && is_coherent && !self.sees_through::<F>();
+        let in_packets = N == LANES && is_coherent && !self.sees_through();
         let mut packet = in_packets.then(RayBlock::empty);
         let mut shadow_rays = [const { Ray::new(glam::Vec3::ZERO, glam::Vec3::ZERO) }; N];
         let mut unshadowed = [Rgb::BLACK; N];

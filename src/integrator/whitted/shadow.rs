@@ -14,8 +14,8 @@ const MAX_SURFACES: u32 = 1 << 12;
 impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Whether light passes glass on its way to a surface.
     #[inline]
-    pub(super) fn sees_through<G: Features>(&self) -> bool {
-        G::EVERYTHING && self.scene.requirements.transparent_shadows
+    pub(super) fn sees_through(&self) -> bool {
+        F::EVERYTHING && self.scene.requirements.transparent_shadows
     }
 
     /// The share of light that comes along a shadow ray of `node`'s hit; none where something opaque
@@ -23,7 +23,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     #[inline]
     pub(super) fn arrives(&mut self, ray: &Ray, node: &Node) -> Option<Rgb> {
         self.counts.shadow += 1;
-        if self.sees_through::<F>() {
+        if self.sees_through() {
             return self.through_glass(ray, node);
         }
         (!self.query.occluded(ray)).then_some(Rgb::splat(1.0))
