@@ -68,7 +68,7 @@ fn spheres(random: &mut Random, n: usize) -> Geometry {
         center: random.in_cube() * 3.0,
         radius: 10f64.powf(random.between(-3.0, 0.0)),
     };
-    Geometry::Spheres(Arc::new((0..n).map(|_| sphere(random)).collect()))
+    Geometry::Shapes((0..n).map(|_| sphere(random)).collect::<Vec<_>>().into())
 }
 
 /// Any affine transform: turned, sheared, unevenly scaled, one in two mirrored.

@@ -1,9 +1,6 @@
 //! Lights that are geometry: the shadow rays of their samples must end before the light's own surface,
 //! near and far, steep and grazing, with each accelerator.
 #![allow(missing_docs, reason = "a test program")]
-
-use std::sync::Arc;
-
 use alhazen::accel::{Accel, AccelKind, BuildOptions, Geometry, Group, RayQuery, World};
 use alhazen::color::Rgb;
 use alhazen::geometry::{Sphere, TriangleMesh};
@@ -45,7 +42,7 @@ fn light(random: &mut Random, at: DVec3, size: f64) -> (Light, Geometry) {
         2 => {
             let sphere = Sphere { center: at, radius: size };
             let light = SphereLight { center: at, radius: size, radiance };
-            (Light::Sphere(light), Geometry::Spheres(Arc::new(vec![sphere])))
+            (Light::Sphere(light), Geometry::Shapes(vec![sphere].into()))
         }
         _ => {
             let triangles = [[at, at + u, at + v]];

@@ -58,7 +58,9 @@ fn scenes_beyond_f32_are_refused() {
         format!("[[objects]]\nshape = \"sphere\"\nradius = {radius}\n{more}\n")
     };
     let scaled = |scale: &str| {
-        sphere("1.0", &format!("transform = [{{ scale = [{scale}, {scale}, 0.1] }}]"))
+        let step = format!("transforms = [[{{ scale = [{scale}, {scale}, 0.1] }}]]");
+        let ball = "[[prototypes.ball.objects]]\nshape = \"sphere\"\nradius = 1.0\n";
+        format!("{ball}[[objects]]\ninstance = \"ball\"\n{step}\n")
     };
     for (text, message) in [
         (sphere("1e13", ""), "coordinates must lie within 1e12 of it"),

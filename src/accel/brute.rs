@@ -1,12 +1,10 @@
 //! Every ray against every primitive, in f64: slow, plain, and what the others are compared with.
 
-use std::sync::Arc;
-
 use glam::{DAffine3, DVec3};
 
 use super::world::{CopyRef, Geometry, World, affine_from_rows};
 use super::{AccelInfo, Hit, RayQuery};
-use crate::geometry::{AnalyticShape, Disk, Sphere, TriangleMesh, intersect_triangle};
+use crate::geometry::{AnalyticShape, intersect_triangle, with_shapes};
 use crate::math::{Bounds, Ray};
 
 /// The oracle: no hierarchy; boxes around whole geometries only.
@@ -20,15 +18,8 @@ pub struct BruteForce {
 /// One geometry and its box, a little enlarged.
 #[derive(Debug)]
 struct Part {
-    shape: Shape,
+    geometry: Geometry,
     bounds: Bounds,
-}
-
-#[derive(Debug)]
-enum Shape {
-    Mesh(TriangleMesh),
-    Spheres(Arc<Vec<Sphere>>),
-    Disks(Arc<Vec<Disk>>),
 }
 
 /// One copy of a prototype.
@@ -93,12 +84,7 @@ impl Part {
         let pad = DVec3::splat(
             1e-9 * (b.size().max_element() + b.min.abs().max(b.max.abs()).max_element()),
         );
-        let shape = match geometry {
-            Geometry::Mesh(mesh) => Shape::Mesh(mesh.clone()),
-            Geometry::Spheres(spheres) => Shape::Spheres(Arc::clone(spheres)),
-            Geometry::Disks(disks) => Shape::Disks(Arc::clone(disks)),
-        };
-        Self { shape, bounds: Bounds { min: b.min - pad, max: b.max + pad } }
+        Self { geometry: geometry.clone(), bounds: Bounds { min: b.min - pad, max: b.max + pad } }
     }
 
     fn visit(
@@ -112,8 +98,8 @@ impl Part {
         if self.bounds.clip(o, d).is_none() {
             return;
         }
-        match &self.shape {
-            Shape::Mesh(mesh) => {
+        match &self.geometry {
+            Geometry::Mesh(mesh) => {
                 for i in 0..mesh.triangles.len() {
                     let corners = mesh.corners(i).map(|p| p.as_dvec3());
                     if let Some(h) = intersect_triangle(corners, o, d, t_min, *t_max) {
@@ -121,8 +107,9 @@ impl Part {
                     }
                 }
             }
-            Shape::Spheres(spheres) => visit_each(spheres, o, d, t_min, t_max, found),
-            Shape::Disks(disks) => visit_each(disks, o, d, t_min, t_max, found),
+            Geometry::Shapes(shapes) => {
+                with_shapes!(shapes, list => visit_each(list, o, d, t_min, t_max, found));
+            }
         }
     }
 }
@@ -136,8 +123,8 @@ fn visit_each<S: AnalyticShape>(
     mut found: impl FnMut(f64, f64, f64, u32) -> f64,
 ) {
     for (i, shape) in (0u32..).zip(shapes) {
-        if let Some(t) = shape.intersect(o, d, t_min, *t_max) {
-            *t_max = found(t, 0.0, 0.0, i);
+        if let Some(hit) = shape.intersect(o, d, t_min, *t_max) {
+            *t_max = found(hit.t, Hit::u_of_part(hit.part).into(), 0.0, i);
         }
     }
 }

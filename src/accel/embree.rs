@@ -16,7 +16,7 @@ use crate::embree::{
     Quality, RayHitPacket, RayPacket, Scene, SceneBuilder, SceneFlags, UserBounds, UserGeometry,
     UserHit,
 };
-use crate::geometry::AnalyticShape;
+use crate::geometry::{AnalyticShape, with_shapes};
 use crate::math::Ray;
 
 /// Sets with more copies than this become instance arrays: 90 bytes a copy instead of 330, for
@@ -278,8 +278,7 @@ fn attach_group(
                 Arc::clone(&mesh.triangles),
                 quality,
             )?,
-            Geometry::Spheres(spheres) => user_geometry(device, spheres)?,
-            Geometry::Disks(disks) => user_geometry(device, disks)?,
+            Geometry::Shapes(shapes) => with_shapes!(shapes, list => user_geometry(device, list))?,
         };
         let id = builder.attach(geometry);
         // Hits are told apart by these ids: ours are Embree's.
@@ -347,9 +346,11 @@ fn user_geometry<S: AnalyticShape>(
 
 /// The box of a shape, rounded outward to f32.
 fn outer_bounds(shape: &impl AnalyticShape) -> UserBounds {
+    /// Where things without end are taken to end: areas of boxes stay far from overflow.
+    const END: f32 = 1e15;
     let b = shape.bounds();
-    let down = |p: DVec3| p.as_vec3().to_array().map(f32::next_down);
-    let up = |p: DVec3| p.as_vec3().to_array().map(f32::next_up);
+    let down = |p: DVec3| p.as_vec3().to_array().map(|x| x.next_down().max(-END));
+    let up = |p: DVec3| p.as_vec3().to_array().map(|x| x.next_up().min(END));
     UserBounds { lower: down(b.min), upper: up(b.max) }
 }
 
@@ -360,9 +361,22 @@ impl<S: AnalyticShape> UserGeometry for Shapes<S> {
     #[inline]
     fn intersect(&self, primitive: u32, ray: &embree::Ray) -> Option<UserHit> {
         let shape = self.0.get(primitive as usize)?;
-        let (origin, direction) =
-            (DVec3::from(ray.origin.map(f64::from)), DVec3::from(ray.direction.map(f64::from)));
-        let t = shape.intersect(origin, direction, f64::from(ray.t_min), f64::from(ray.t_max))?;
-        Some(UserHit { t: t as f32, u: 0.0, v: 0.0 })
+        let (origin, direction, t_min, t_max) = widened(ray);
+        let hit = shape.intersect(origin, direction, t_min, t_max)?;
+        Some(UserHit { t: hit.t as f32, u: Hit::u_of_part(hit.part), v: 0.0 })
     }
+
+    #[inline]
+    fn occluded(&self, primitive: u32, ray: &embree::Ray) -> bool {
+        let Some(shape) = self.0.get(primitive as usize) else { return false };
+        let (origin, direction, t_min, t_max) = widened(ray);
+        shape.occluded(origin, direction, t_min, t_max)
+    }
+}
+
+/// Origin, direction and ends of a ray in f64.
+#[inline]
+fn widened(ray: &embree::Ray) -> (DVec3, DVec3, f64, f64) {
+    let wide = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    (wide(ray.origin), wide(ray.direction), ray.t_min.into(), ray.t_max.into())
 }

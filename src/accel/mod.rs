@@ -48,9 +48,10 @@ pub trait RayQuery: Sync {
 pub struct Hit {
     /// Distance along the ray.
     pub t: f32,
-    /// Barycentric weight of a triangle's second corner, in [0, 1]; 0 for other shapes.
+    /// Barycentric weight of a triangle's second corner, in [0, 1]. Of another shape, which of its parts
+    /// was hit: see [`Hit::part`].
     pub u: f32,
-    /// Barycentric weight of its third corner.
+    /// Barycentric weight of its third corner; 0 for other shapes.
     pub v: f32,
     /// Index within the geometry.
     pub primitive: u32,
@@ -58,6 +59,20 @@ pub struct Hit {
     pub geometry: u32,
     /// The copy that was hit; none in the root group.
     pub copy: Option<CopyRef>,
+}
+
+impl Hit {
+    /// Which part of a shape was hit; not for triangles.
+    #[inline]
+    pub const fn part(&self) -> u8 {
+        (self.u * 256.0) as u8
+    }
+
+    /// The part of a shape in the place of `u`: below 1, and exact.
+    #[inline]
+    pub(crate) const fn u_of_part(part: u8) -> f32 {
+        part as f32 / 256.0
+    }
 }
 
 /// How far a build may go to make hits exact.

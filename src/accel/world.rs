@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use crate::geometry::{AnalyticShape, Disk, Sphere, TriangleMesh};
+use crate::geometry::{AnalyticShape, Shapes, TriangleMesh, with_shapes};
 use crate::math::Bounds;
 
 /// One geometry: many primitives of one kind.
@@ -12,10 +12,8 @@ use crate::math::Bounds;
 pub enum Geometry {
     /// Triangles; relative to the group's origin, so that the mesh's own `origin` is zero.
     Mesh(TriangleMesh),
-    /// Spheres.
-    Spheres(Arc<Vec<Sphere>>),
-    /// Flat disks.
-    Disks(Arc<Vec<Disk>>),
+    /// Shapes of one kind.
+    Shapes(Shapes),
 }
 
 /// Geometries in one space.
@@ -58,9 +56,10 @@ pub struct World {
 }
 
 impl Group {
-    /// The box around everything in it.
+    /// The box around everything in it that has an end.
     pub fn bounds(&self) -> Bounds {
-        self.geometries.iter().map(Geometry::bounds).fold(Bounds::EMPTY, Bounds::union)
+        let bounds = self.geometries.iter().map(Geometry::bounds).filter(Bounds::is_finite);
+        bounds.fold(Bounds::EMPTY, Bounds::union)
     }
 }
 
@@ -69,8 +68,7 @@ impl Geometry {
     pub fn len(&self) -> usize {
         match self {
             Self::Mesh(mesh) => mesh.triangles.len(),
-            Self::Spheres(spheres) => spheres.len(),
-            Self::Disks(disks) => disks.len(),
+            Self::Shapes(shapes) => shapes.len(),
         }
     }
 
@@ -83,18 +81,13 @@ impl Geometry {
     pub fn bounds(&self) -> Bounds {
         match self {
             Self::Mesh(mesh) => mesh.bounds(),
-            Self::Spheres(spheres) => bounds_of(spheres),
-            Self::Disks(disks) => bounds_of(disks),
+            Self::Shapes(shapes) => shapes.bounds(),
         }
     }
 }
 
-fn bounds_of(shapes: &[impl AnalyticShape]) -> Bounds {
-    shapes.iter().map(AnalyticShape::bounds).fold(Bounds::EMPTY, Bounds::union)
-}
-
 impl World {
-    /// The box around everything, copies included.
+    /// The box around everything that has an end, copies included.
     pub fn bounds(&self) -> Bounds {
         let prototypes: Vec<Bounds> = self.prototypes.iter().map(Group::bounds).collect();
         let copies = self.sets.iter().flat_map(|set| {
@@ -104,6 +97,11 @@ impl World {
         copies.fold(self.root.bounds(), Bounds::union)
     }
 
+    /// Whether there is something without end in it.
+    pub fn is_endless(&self) -> bool {
+        self.root.geometries.iter().any(|g| !g.is_empty() && !g.bounds().is_finite())
+    }
+
     /// How far the world reaches in each of four directions: the largest dot product of a point with
     /// it. Copies count by their boxes.
     pub fn support(&self, directions: [DVec3; 4]) -> [f64; 4] {
@@ -111,15 +109,11 @@ impl World {
         let mut add = |far: [f64; 4]| {
             reach = std::array::from_fn(|i| reach[i].max(far[i]));
         };
-        for geometry in &self.root.geometries {
+        for geometry in self.root.geometries.iter().filter(|g| g.bounds().is_finite()) {
             match geometry {
                 Geometry::Mesh(mesh) => add(mesh.support(directions)),
-                Geometry::Spheres(spheres) => spheres.iter().for_each(|s| {
-                    add(directions.map(|d| d.dot(s.center) + d.length() * s.radius));
-                }),
-                Geometry::Disks(disks) => disks.iter().for_each(|disk| {
-                    let across = |d: DVec3| d.reject_from_normalized(disk.normal).length();
-                    add(directions.map(|d| d.dot(disk.center) + across(d) * disk.radius));
+                Geometry::Shapes(shapes) => with_shapes!(shapes, list => {
+                    list.iter().for_each(|shape| add(directions.map(|d| shape.reach(d))));
                 }),
             }
         }

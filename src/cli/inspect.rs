@@ -53,15 +53,12 @@ fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
         let parts: Vec<String> = parts.iter().flatten().cloned().collect();
         if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") }
     };
-    fact(
-        "geometry",
-        joined(&[
-            counted(r.triangles, "triangle", "triangles"),
-            counted(r.smooth_meshes, "mesh with shading normals", "meshes with shading normals"),
-            counted(r.spheres, "sphere", "spheres"),
-            counted(r.disks, "disk", "disks"),
-        ]),
-    );
+    let mut geometry = vec![
+        counted(r.triangles, "triangle", "triangles"),
+        counted(r.smooth_meshes, "mesh with shading normals", "meshes with shading normals"),
+    ];
+    geometry.extend(r.shapes.iter().map(|&([one, many], n)| counted(n, one, many)));
+    fact("geometry", joined(&geometry));
     if r.copies > 0 {
         let prototypes = counted(r.prototypes, "prototype", "prototypes").unwrap_or_default();
         let copies = counted(r.copies, "copy", "copies").unwrap_or_default();
@@ -151,7 +148,7 @@ fn requirements(scene: &Scene) -> Vec<String> {
     need(is_lit && r.glows, "light of surfaces that are seen, as some glow");
     need(is_lit && r.fog, "transmittances of fog, as there is a `[medium]`");
     need(r.lens, "points on a lens drawn at random, as the camera has one");
-    need(r.spheres + r.disks > 0, "user geometry, as there are spheres or disks");
+    need(!r.shapes.is_empty(), "user geometry, as there are shapes that are no triangles");
     need(r.copies > 0, "a second level, as there are instances");
     needed
 }

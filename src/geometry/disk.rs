@@ -1,11 +1,12 @@
-//! Flat disks, solved in f64.
+//! Flat disks and rings, solved in f64.
 
-use glam::DVec3;
+use glam::{DQuat, DVec2, DVec3};
 
-use super::AnalyticShape;
+use super::shape::longitude;
+use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
-/// A flat disk, in the space of its group.
+/// A flat disk, or the ring that is left of it without a smaller one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disk {
     /// Centre.
@@ -14,32 +15,63 @@ pub struct Disk {
     pub normal: DVec3,
     /// Radius, > 0.
     pub radius: f64,
+    /// Radius of the hole, ≥ 0.
+    pub inner_radius: f64,
 }
 
 impl AnalyticShape for Disk {
-    /// The box around it: along each axis it reaches r·√(1 − n²).
     fn bounds(&self) -> Bounds {
+        // Along each axis it reaches r·√(1 − n²).
         let reach = (DVec3::ONE - self.normal * self.normal).max(DVec3::ZERO);
         let reach = reach.map(f64::sqrt) * self.radius;
         Bounds { min: self.center - reach, max: self.center + reach }
     }
 
-    /// The hit, if it is at t in (`t_min`, `t_max`]. A ray within its plane has none.
+    /// A ray within its plane has no hit.
     #[inline]
-    fn intersect(&self, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> Option<f64> {
+    fn intersect(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        t_min: f64,
+        t_max: f64,
+    ) -> Option<ShapeHit> {
         let to_center = self.center - origin;
         let t = to_center.dot(self.normal) / direction.dot(self.normal);
-        let off = direction * t - to_center;
+        let off = (direction * t - to_center).length_squared();
         // Also refuses NaN.
-        let is_hit = t > t_min && t <= t_max && off.length_squared() <= self.radius * self.radius;
-        is_hit.then_some(t)
+        let is_on =
+            off <= self.radius * self.radius && off >= self.inner_radius * self.inner_radius;
+        (t > t_min && t <= t_max && is_on).then_some(ShapeHit::at(t))
     }
-}
 
-impl Disk {
-    /// The point of its plane nearest to `p`.
-    pub fn nearest(&self, p: DVec3) -> DVec3 {
-        p - self.normal * (p - self.center).dot(self.normal)
+    fn surface_at(&self, p: DVec3, _part: u8) -> ShapePoint {
+        let position = p - self.normal * (p - self.center).dot(self.normal);
+        ShapePoint { position, normal: self.normal }
+    }
+
+    /// u runs around the normal, v from the hole (or the centre) to the rim.
+    fn parameters(&self, p: DVec3, _part: u8) -> Parameters {
+        let turn = DQuat::from_rotation_arc(DVec3::Y, self.normal);
+        let inner = turn.inverse() * (p - self.center);
+        let (u, dp_du) = longitude(inner);
+        let r = inner.x.hypot(inner.z);
+        let width = self.radius - self.inner_radius;
+        let outward = if r > 0.0 { DVec3::new(inner.x, 0.0, inner.z) / r } else { DVec3::Z };
+        Parameters {
+            uv: DVec2::new(u, (r - self.inner_radius) / width),
+            dp_du: turn * dp_du,
+            dp_dv: turn * outward * width,
+        }
+    }
+
+    fn curvature(&self, _p: DVec3, _part: u8) -> f64 {
+        0.0
+    }
+
+    fn reach(&self, direction: DVec3) -> f64 {
+        let across = direction.reject_from_normalized(self.normal).length();
+        direction.dot(self.center) + across * self.radius
     }
 }
 
@@ -49,11 +81,15 @@ mod tests {
 
     #[test]
     fn inside_outside_and_along() {
-        let disk = Disk { center: DVec3::new(1.0, 2.0, 3.0), normal: DVec3::Y, radius: 0.5 };
-        let hit = |o: [f64; 3], d: [f64; 3]| disk.intersect(o.into(), d.into(), 0.0, 10.0);
+        let center = DVec3::new(1.0, 2.0, 3.0);
+        let disk = Disk { center, normal: DVec3::Y, radius: 0.5, inner_radius: 0.1 };
+        let hit = |o: [f64; 3], d: [f64; 3]| {
+            disk.intersect(o.into(), d.into(), 0.0, 10.0).map(|hit| hit.t)
+        };
         assert_eq!(hit([1.4, 4.0, 3.0], [0.0, -2.0, 0.0]), Some(1.0));
         assert_eq!(hit([1.4, 0.0, 3.0], [0.0, 1.0, 0.0]), Some(2.0), "from behind");
         assert_eq!(hit([1.6, 4.0, 3.0], [0.0, -1.0, 0.0]), None, "beside it");
+        assert_eq!(hit([1.05, 4.0, 3.05], [0.0, -1.0, 0.0]), None, "through the hole");
         assert_eq!(hit([0.0, 2.0, 3.0], [1.0, 0.0, 0.0]), None, "within its plane");
         assert_eq!(hit([1.0, 14.0, 3.0], [0.0, -1.0, 0.0]), None, "too far");
     }
@@ -61,7 +97,8 @@ mod tests {
     #[test]
     fn the_box_touches_the_rim() {
         let normal = DVec3::new(1.0, 2.0, -2.0) / 3.0;
-        let disk = Disk { center: DVec3::new(5.0, 0.0, 1.0), normal, radius: 2.0 };
+        let center = DVec3::new(5.0, 0.0, 1.0);
+        let disk = Disk { center, normal, radius: 2.0, inner_radius: 0.0 };
         let (a, b) = normal.any_orthonormal_pair();
         let rim = (0..10_000).map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 10_000.0).sin_cos();

@@ -1,25 +1,31 @@
 //! What there is to hit: triangle meshes and analytic shapes, with bounds, exact intersection and
-//! normals. No light, no colour, no acceleration: a shape is solved here, found elsewhere.
+//! normals. A new shape implements [`AnalyticShape`] and has a line in `shapes.rs`. No light, no colour, no acceleration: a shape is solved here, found elsewhere.
 
+mod cone;
+mod cuboid;
 mod disk;
+mod framed;
 mod mesh;
+mod plane;
+mod polygon;
+mod quadric;
+mod shape;
+mod shapes;
 mod sphere;
+mod torus;
 mod triangle;
 
+pub use cone::Cone;
+pub use cuboid::Cuboid;
 pub use disk::Disk;
+pub use framed::Framed;
 pub use mesh::{Positions, TriangleMesh};
+pub use plane::Plane;
+pub use polygon::{NoPolygon, Polygon};
+pub use quadric::Quadric;
+pub use shape::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
+pub(crate) use shapes::with_shapes;
+pub use shapes::{PlacedShape, Shapes};
 pub use sphere::Sphere;
+pub use torus::Torus;
 pub use triangle::{TriangleHit, intersect_triangle};
-
-use glam::DVec3;
-
-use crate::math::Bounds;
-
-/// A shape that is solved as a whole.
-pub trait AnalyticShape: Copy + Send + Sync + 'static {
-    /// The box around it.
-    fn bounds(&self) -> Bounds;
-
-    /// The first hit at t in (`t_min`, `t_max`], in lengths of `direction`.
-    fn intersect(&self, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> Option<f64>;
-}

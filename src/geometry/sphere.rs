@@ -1,8 +1,9 @@
 //! Spheres, solved in f64.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use super::AnalyticShape;
+use super::shape::longitude;
+use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
 /// A sphere, in the space of its group.
@@ -30,7 +31,13 @@ impl AnalyticShape for Sphere {
     /// Source: Haines, Günther, Akenine-Möller, *Precision Improvements for Ray/Sphere
     /// Intersection*, Ray Tracing Gems ch. 7.
     #[inline]
-    fn intersect(&self, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) -> Option<f64> {
+    fn intersect(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        t_min: f64,
+        t_max: f64,
+    ) -> Option<ShapeHit> {
         let l = self.center - origin;
         let d2 = direction.length_squared();
         let r2 = self.radius * self.radius;
@@ -45,12 +52,31 @@ impl AnalyticShape for Sphere {
         // q = 0 only for a tangent ray that starts at the point of contact: c/q is NaN, and no hit.
         let (t0, t1) = if b > 0.0 { (c / q, q / d2) } else { (q / d2, c / q) };
         if t0 > t_min && t0 <= t_max {
-            Some(t0)
+            Some(ShapeHit::at(t0))
         } else if t1 > t_min && t1 <= t_max {
-            Some(t1)
+            Some(ShapeHit::at(t1))
         } else {
             None
         }
+    }
+
+    #[inline]
+    fn surface_at(&self, p: DVec3, _part: u8) -> ShapePoint {
+        let normal = self.normal_at(p);
+        ShapePoint { position: self.center + normal * self.radius, normal }
+    }
+
+    /// Longitude and latitude, as [`globe`] has them.
+    fn parameters(&self, p: DVec3, _part: u8) -> Parameters {
+        globe(p - self.center)
+    }
+
+    fn curvature(&self, _p: DVec3, _part: u8) -> f64 {
+        1.0 / self.radius
+    }
+
+    fn reach(&self, direction: DVec3) -> f64 {
+        direction.dot(self.center) + direction.length() * self.radius
     }
 }
 
@@ -69,6 +95,19 @@ impl Sphere {
     }
 }
 
+/// Longitude and latitude of a point on a globe around +Y, each from 0 to 1: u = ½ on +Z, rising
+/// towards +X; and the change of the point with them.
+fn globe(m: DVec3) -> Parameters {
+    use std::f64::consts::PI;
+    let across = m.x.hypot(m.z);
+    let (u, dp_du) = longitude(m);
+    let v = 0.5 + m.y.atan2(across) / PI;
+    // At the poles all meridians meet; any direction will do.
+    let east = if across > 0.0 { DVec3::new(m.x, 0.0, m.z) / across } else { DVec3::X };
+    let dp_dv = (DVec3::Y * across - east * m.y) * PI;
+    Parameters { uv: DVec2::new(u, v), dp_du, dp_dv }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,13 +116,38 @@ mod tests {
     #[test]
     fn inside_outside_and_past() {
         let s = Sphere { center: DVec3::ZERO, radius: 1.0 };
-        let hit = |z: f64, d: f64| s.intersect(DVec3::new(0.0, 0.0, z), DVec3::Z * d, 0.0, 1e30);
+        let hit = |z: f64, d: f64| {
+            s.intersect(DVec3::new(0.0, 0.0, z), DVec3::Z * d, 0.0, 1e30).map(|hit| hit.t)
+        };
         assert_eq!(hit(-3.0, 1.0), Some(2.0));
         assert_eq!(hit(-3.0, 2.0), Some(1.0), "t counts in lengths of the direction");
         assert_eq!(hit(0.0, 1.0), Some(1.0), "from the centre");
         assert_eq!(hit(3.0, 1.0), None, "behind");
         assert_eq!(hit(1.0, 1.0), None, "on the surface, outward");
         assert_eq!(hit(1.0, -1.0), Some(2.0), "on the surface, inward");
+    }
+
+    #[test]
+    fn a_globe_has_its_meridians_and_parallels() {
+        let at = |p: DVec3| globe(p).uv;
+        assert_eq!(at(DVec3::Z), DVec2::new(0.5, 0.5));
+        assert_eq!(at(DVec3::X), DVec2::new(0.75, 0.5));
+        assert_eq!(at(DVec3::Y).y, 1.0);
+        // Partials against differences.
+        let p = DVec3::new(0.3, 0.5, -0.7) * 2.0;
+        let Parameters { uv, dp_du: du, dp_dv: dv } = globe(p);
+        let place = |u: f64, v: f64| {
+            let (longitude, latitude) = ((u - 0.5) * 2.0, v - 0.5);
+            let (s, c) = (longitude * std::f64::consts::PI).sin_cos();
+            let (y, across) = (latitude * std::f64::consts::PI).sin_cos();
+            DVec3::new(s * across, y, c * across) * p.length()
+        };
+        let [u, v] = uv.to_array();
+        let h = 1e-5;
+        let by_u = (place(u + h, v) - place(u - h, v)) / (2.0 * h);
+        let by_v = (place(u, v + h) - place(u, v - h)) / (2.0 * h);
+        assert!((place(u, v) - p).length() < 1e-5);
+        assert!((by_u - du).length() < 1e-3 && (by_v - dv).length() < 1e-3);
     }
 
     proptest! {
@@ -105,7 +169,7 @@ mod tests {
             let inner = s.center + DVec3::from(aim) * radius;
             let direction = (inner - origin).normalize();
             let t = s.intersect(origin, direction, 0.0, f64::INFINITY);
-            let p = origin + direction * t.expect("aimed at a point inside");
+            let p = origin + direction * t.expect("aimed at a point inside").t;
             let off = ((p - s.center).length() - radius).abs() / radius;
             // One rounding of the origin's distance.
             prop_assert!(off < 4e-16 * 10f64.powf(log_distance) * 8.0 + 1e-14, "{off}");

@@ -23,7 +23,7 @@ impl Integrator for Flat {
             Some(hit) => {
                 let ray = camera.rays.get(lane);
                 let mut point = scene.surface(&ray, hit);
-                let cone = scene.widened(Cone::of_pixel(scene, &ray), hit);
+                let cone = scene.widened(Cone::of_pixel(scene, &ray), hit, point.position);
                 match scene.apply_maps(hit, cone.width, &mut point) {
                     None => point.material.albedo(),
                     Some(material) => material.albedo(),

@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::document::{Document, Entry, Node, Span, Value};
 use super::mistakes::{Mistake, Mistakes};
 use crate::color::{Rgb, linear_from_srgb};
+use crate::math::Bounds;
 use crate::scene::Location;
 
 /// A document that is being read, and the mistakes found so far.
@@ -269,6 +270,74 @@ impl<'d, 'r> Fields<'d, 'r> {
 
     pub(super) fn require_vector(&self, name: &'static str) -> Option<DVec3> {
         self.require(name).and_then(|node| self.reader.numbers(node, name)).map(DVec3::from)
+    }
+
+    /// A required number above zero.
+    pub(super) fn require_positive(&self, name: &'static str) -> Option<f64> {
+        self.require(name).and_then(|node| self.positive(node, name))
+    }
+
+    /// A required vector of any length but zero.
+    pub(super) fn require_direction(&self, name: &'static str) -> Option<DVec3> {
+        let direction = self.require_vector(name)?;
+        self.check_direction(name, direction)
+    }
+
+    /// A vector of any length but zero.
+    pub(super) fn direction(&self, name: &'static str, default: DVec3) -> Option<DVec3> {
+        match self.get(name) {
+            None => Some(default),
+            Some(_) => self.vector(name).and_then(|d| self.check_direction(name, d)),
+        }
+    }
+
+    fn check_direction(&self, name: &'static str, direction: DVec3) -> Option<DVec3> {
+        if direction.length() >= 1e-30 {
+            return Some(direction);
+        }
+        let span = self.get(name).map_or(self.span(), |node| node.span);
+        self.reader.mistake(span, format!("`{name}` must not be zero"));
+        None
+    }
+
+    /// Two required points, of which the second is greater along every axis.
+    pub(super) fn require_box(&self, min: &'static str, max: &'static str) -> Option<Bounds> {
+        let (low, high) = (self.require_vector(min), self.require_vector(max));
+        let bounds = Bounds { min: low?, max: high? };
+        let span = self.get(max).map_or(self.span(), |node| node.span);
+        self.check_box(
+            span,
+            bounds,
+            &format!("`{max}` must be greater than `{min}` along every axis"),
+        )
+    }
+
+    /// A required box, as the list of its least and its greatest corner.
+    pub(super) fn require_bounds(&self, name: &'static str) -> Option<Bounds> {
+        let node = self.require(name)?;
+        let Value::Array(corners) = &node.value else {
+            self.expected(node, name, "[[least x, y, z], [greatest x, y, z]]");
+            return None;
+        };
+        let [low, high] = corners.as_slice() else {
+            self.expected(node, name, "[[least x, y, z], [greatest x, y, z]]");
+            return None;
+        };
+        let corner = |node| self.reader.numbers::<3>(node, name).map(DVec3::from);
+        let bounds = Bounds { min: corner(low)?, max: corner(high)? };
+        let message = format!(
+            "the second corner of `{name}` must be greater than the first along every axis"
+        );
+        self.check_box(node.span, bounds, &message)
+    }
+
+    fn check_box(&self, span: Span, bounds: Bounds, message: &str) -> Option<Bounds> {
+        if bounds.min.cmplt(bounds.max).all() {
+            return Some(bounds);
+        }
+        self.reader
+            .mistake(span, format!("{message}; it is from {} to {}", bounds.min, bounds.max));
+        None
     }
 
     pub(super) fn color(&self, name: &'static str) -> Option<Rgb> {

@@ -36,6 +36,11 @@ impl Bounds {
         !self.min.cmple(self.max).all()
     }
 
+    /// Whether it holds something, and has an end along every axis.
+    pub fn is_finite(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite()
+    }
+
     /// The middle; the origin for an empty box.
     pub fn center(&self) -> DVec3 {
         if self.is_empty() { DVec3::ZERO } else { 0.5 * (self.min + self.max) }

@@ -5,11 +5,13 @@
 //! them. Nothing here knows what is hit or how it looks.
 
 mod bounds;
+mod quartic;
 mod ray;
 mod rounding;
 mod warp;
 
 pub use bounds::Bounds;
+pub use quartic::Quartic;
 pub use ray::Ray;
 pub use rounding::{gamma, offset_ray_origin};
 pub use warp::{concentric_disk, cosine_hemisphere};

@@ -8,11 +8,12 @@ use glam::{DAffine3, DVec3};
 use super::desc::{
     CameraDesc, LensDesc, Location, MaterialDesc, PlaceDesc, Reference, RenderSettings, SceneDesc,
 };
+use super::draft::{GeometryLooks, Look};
 use super::lights::{
     Emission, add_surfaces, default_lights, glowing_objects, is_hidden, written_lights,
 };
 use super::maps::Maps;
-use super::place::{GeometryLooks, Look, Placed, place};
+use super::place::{Placed, place};
 use super::requirements::{Contents, Requirements};
 use super::surface::SurfacePoint;
 use crate::accel::{Accel, AccelError, AccelKind, BuildOptions, Hit, World};
@@ -193,17 +194,17 @@ pub enum SceneError {
         /// The limit.
         limit: u64,
     },
-    /// An ellipsoid cannot be sampled as a light.
+    /// A shape cannot be sampled as a light.
     #[error(
-        "{at}: a sphere with `emission` must not be stretched more along one axis than along another; accepted: even scales, or a mesh"
+        "{at}: this object cannot give off light; accepted with `emission`: meshes, and spheres of even scale"
     )]
-    GlowingEllipsoid {
+    CannotGlow {
         /// The object; that of a copy is not known.
         at: Location,
     },
     /// A texture by texture coordinates lies on an object that has none.
     #[error(
-        "{at}: the texture of material `{material}` needs texture coordinates, which this mesh does not have; accepted: a mesh with them, or a texture by position (for images `mapping` = \"planar\", \"spherical\" or \"cylindrical\")"
+        "{at}: the texture of material `{material}` needs texture coordinates, which this object does not have; accepted: one with them, or a texture by position (for images `mapping` = \"planar\", \"spherical\" or \"cylindrical\")"
     )]
     NoTextureCoordinates {
         /// The object.
@@ -339,7 +340,9 @@ impl Scene {
             }
         };
         let lens = desc.camera.as_ref().and_then(|camera| lens(camera, &pose, center, &bounds));
-        let mut camera = Camera::new(pose, projection, lens, size, bounds);
+        // Rays of a far camera start at the scene's box, if all that they may hit is in it.
+        let start = if world.is_endless() { Bounds::EMPTY } else { bounds };
+        let mut camera = Camera::new(pose, projection, lens, size, start);
         if desc.fog.is_some() {
             camera.keep_all_rays();
         }

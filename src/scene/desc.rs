@@ -10,9 +10,10 @@ use crate::accel::{BuildQuality, Precision};
 use crate::camera::Projection;
 use crate::color::Rgb;
 use crate::film::Filter;
-use crate::geometry::TriangleMesh;
+use crate::geometry::{Polygon, Quadric, TriangleMesh};
 use crate::light::Falloff;
 use crate::material::Material;
+use crate::math::Bounds;
 use crate::medium::Fog;
 
 /// Where something was written: `scene.toml:12:3`.
@@ -328,7 +329,44 @@ pub enum ShapeDesc {
         normal: DVec3,
         /// Radius, > 0.
         radius: f64,
+        /// Radius of the hole, ≥ 0 and less than `radius`.
+        inner_radius: f64,
     },
+    /// A box along the axes.
+    Box(Bounds),
+    /// A cylinder, a cone or a truncated cone.
+    Cone {
+        /// Middle of its bottom.
+        from: DVec3,
+        /// Middle of its top, elsewhere.
+        to: DVec3,
+        /// Radius at the bottom and at the top, ≥ 0, not both 0.
+        radii: [f64; 2],
+        /// Whether it is closed at both ends.
+        has_caps: bool,
+    },
+    /// A torus.
+    Torus {
+        /// Centre.
+        center: DVec3,
+        /// Axis, any length but zero.
+        axis: DVec3,
+        /// Radius of the ring, ≥ 0.
+        major_radius: f64,
+        /// Radius of the tube, > 0.
+        minor_radius: f64,
+    },
+    /// A plane without end.
+    Plane {
+        /// One of its points.
+        point: DVec3,
+        /// Normal of its front, any length but zero.
+        normal: DVec3,
+    },
+    /// A quadric.
+    Quadric(Quadric),
+    /// A flat polygon.
+    Polygon(Polygon),
     /// Copies of a prototype, one a transform.
     Instances {
         /// Which prototype.

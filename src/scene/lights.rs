@@ -7,11 +7,12 @@ use glam::DVec3;
 
 use super::build::SceneError;
 use super::desc::{LightDesc, Location, MaterialDesc, ObjectDesc, Reference, SceneDesc, ShapeDesc};
-use super::place::{GeometryLooks, Placed};
+use super::draft::GeometryLooks;
+use super::place::Placed;
 use crate::accel::{Geometry, affine_from_rows};
 use crate::camera::Pose;
 use crate::color::Rgb;
-use crate::geometry::TriangleMesh;
+use crate::geometry::{Shapes, TriangleMesh};
 use crate::light::{
     DirectionalLight, DiskLight, Light, MeshLight, PointLight, RectangleLight, SphereLight,
     SpotLight,
@@ -63,7 +64,7 @@ pub(super) fn add_surfaces(desc: &mut SceneDesc) {
                 (ShapeDesc::Mesh(desc.meshes.len() - 1), radiance)
             }
             LightDesc::Disk { center, normal, radius, radiance } => {
-                (ShapeDesc::Disk { center, normal, radius }, radiance)
+                (ShapeDesc::Disk { center, normal, radius, inner_radius: 0.0 }, radiance)
             }
             LightDesc::Sphere { center, radius, radiance } => {
                 (ShapeDesc::Sphere { center, radius }, radiance)
@@ -146,7 +147,7 @@ pub(super) fn glowing_objects(
                 let light = MeshLight::new(all, emission.radiance, emission.is_two_sided);
                 lights.push(Light::Mesh(light));
             }
-            Geometry::Spheres(spheres) => {
+            Geometry::Shapes(Shapes::Spheres(spheres)) => {
                 for (i, sphere) in spheres.iter().enumerate() {
                     let Some(emission) = glow(i) else { continue };
                     // Copies are in f32: even to within its rounding.
@@ -154,7 +155,7 @@ pub(super) fn glowing_objects(
                     let scale = m.matrix3.determinant().abs().cbrt();
                     let is_even = |axis: &DVec3| (axis.length() / scale - 1.0).abs() < 1e-5;
                     if !axes.iter().all(is_even) {
-                        return Err(SceneError::GlowingEllipsoid { at: Location::default() });
+                        return Err(SceneError::CannotGlow { at: Location::default() });
                     }
                     lights.push(Light::Sphere(SphereLight {
                         center: m.transform_point3(sphere.center),
@@ -163,8 +164,8 @@ pub(super) fn glowing_objects(
                     }));
                 }
             }
-            // Only lights are disks.
-            Geometry::Disks(_) => {}
+            // Others are lights already, or refused before.
+            Geometry::Shapes(_) => {}
         }
         Ok(())
     };

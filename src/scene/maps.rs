@@ -3,9 +3,10 @@
 use glam::{DMat3, DVec3, Vec2, Vec3};
 
 use super::build::Scene;
-use super::place::Look;
+use super::draft::Look;
 use super::surface::SurfacePoint;
 use crate::accel::{Geometry, Hit, affine_from_rows};
+use crate::geometry::{AnalyticShape, Parameters, Shapes, Sphere, with_shapes};
 use crate::material::Material;
 use crate::math::Ray;
 use crate::texture::{BumpGradient, Footprint, Mapping, MipMap, Space, Texture, TexturePoint};
@@ -110,10 +111,10 @@ struct Site {
 }
 
 impl Scene {
-    /// The cone of a ray at its hit, with which its children start.
-    pub fn widened(&self, cone: Cone, hit: &Hit) -> Cone {
+    /// The cone of a ray at its hit, at `p`, with which its children start.
+    pub fn widened(&self, cone: Cone, hit: &Hit, p: Vec3) -> Cone {
         let width = cone.width + cone.spread * hit.t;
-        Cone { width, spread: cone.spread, turn: self.curvature(hit) * width }
+        Cone { width, spread: cone.spread, turn: self.curvature(hit, p) * width }
     }
 
     /// Bends the normal of a hit by its material's maps, and returns the material as its textures make
@@ -190,13 +191,32 @@ impl Scene {
                     (uv, *m * du, *m * dv)
                 }
             },
-            Geometry::Spheres(spheres) => {
-                let center = frame.transform_point3(spheres[primitive].center);
-                let (uv, du, dv) = globe(position - center);
-                let inverse = texture_from_world.inverse();
-                (uv, inverse * du, inverse * dv)
+            Geometry::Shapes(shapes) => {
+                // A globe lies in texture space, where it may have been turned.
+                let globe = |center: DVec3| {
+                    let globe = Sphere { center: frame.transform_point3(center), radius: 1.0 };
+                    let inverse = texture_from_world.inverse();
+                    let Parameters { uv, dp_du, dp_dv } = globe.parameters(position, 0);
+                    Parameters { uv, dp_du: inverse * dp_du, dp_dv: inverse * dp_dv }
+                };
+                let Parameters { uv, dp_du, dp_dv } = match shapes {
+                    Shapes::Spheres(list) => globe(list[primitive].center),
+                    Shapes::Ellipsoids(list) => {
+                        let ellipsoid = &list[primitive];
+                        let center = ellipsoid.shape().center;
+                        globe(ellipsoid.outer_from_inner().transform_point3(center))
+                    }
+                    _ => with_shapes!(shapes, list => {
+                        let group_from_world = world_from_group.inverse();
+                        let p = group_from_world.transform_point3(point.position.as_dvec3());
+                        let Parameters { uv, dp_du, dp_dv } =
+                            list[primitive].parameters(p, hit.part());
+                        let m = &world_from_group.matrix3;
+                        Parameters { uv, dp_du: *m * dp_du, dp_dv: *m * dp_dv }
+                    }),
+                };
+                (uv.as_vec2(), dp_du, dp_dv)
             }
-            Geometry::Disks(_) => (Vec2::ZERO, DVec3::ZERO, DVec3::ZERO),
         };
         let scale = texture_from_world.determinant().abs().cbrt();
         let per_uv = dp_du.cross(dp_dv).length().sqrt();
@@ -212,12 +232,19 @@ impl Scene {
     }
 
     /// About how much the normal turns for each unit of distance along the surface.
-    fn curvature(&self, hit: &Hit) -> f32 {
+    fn curvature(&self, hit: &Hit, p: Vec3) -> f32 {
         let geometry = &self.world.group(hit.copy).geometries[hit.geometry as usize];
         let primitive = hit.primitive as usize;
         let in_group = match geometry {
-            Geometry::Spheres(spheres) => 1.0 / spheres[primitive].radius as f32,
-            Geometry::Disks(_) => 0.0,
+            Geometry::Shapes(Shapes::Spheres(spheres)) => 1.0 / spheres[primitive].radius as f32,
+            Geometry::Shapes(shapes) => {
+                let world_from_group = hit.copy.map(|copy| self.world.transform(copy));
+                let p = match world_from_group {
+                    None => p.as_dvec3(),
+                    Some(rows) => affine_from_rows(rows).inverse().transform_point3(p.as_dvec3()),
+                };
+                with_shapes!(shapes, list => list[primitive].curvature(p, hit.part())) as f32
+            }
             Geometry::Mesh(mesh) => match &mesh.normals {
                 None => 0.0,
                 Some(normals) => {
@@ -252,20 +279,6 @@ fn partials([a, b, c]: [DVec3; 3], [s, t, r]: [Vec2; 3]) -> (DVec3, DVec3) {
         return (DVec3::ZERO, DVec3::ZERO);
     }
     ((e * v2 - f * v1) / determinant, (f * u1 - e * u2) / determinant)
-}
-
-/// Longitude and latitude of a point on a globe around +Y, each from 0 to 1: u = ½ on +Z, rising
-/// towards +X; and the change of the point with them.
-fn globe(m: DVec3) -> (Vec2, DVec3, DVec3) {
-    use std::f64::consts::{PI, TAU};
-    let across = m.x.hypot(m.z);
-    let u = 0.5 + m.x.atan2(m.z) / TAU;
-    let v = 0.5 + m.y.atan2(across) / PI;
-    let dp_du = DVec3::new(m.z, 0.0, -m.x) * TAU;
-    // At the poles all meridians meet; any direction will do.
-    let east = if across > 0.0 { DVec3::new(m.x, 0.0, m.z) / across } else { DVec3::X };
-    let dp_dv = (DVec3::Y * across - east * m.y) * PI;
-    (Vec2::new(u as f32, v as f32), dp_du, dp_dv)
 }
 
 /// The normal of tangent space `n` on the surface, on the viewer's side.
@@ -322,28 +335,5 @@ mod tests {
         assert!((du - DVec3::new(2.0, 0.0, -3.0)).length() < 1e-6);
         assert!((dv - DVec3::new(0.5, 1.0, 0.0)).length() < 1e-6);
         assert_eq!(partials([DVec3::ZERO, DVec3::X, DVec3::Y], [Vec2::ZERO; 3]).0, DVec3::ZERO);
-    }
-
-    #[test]
-    fn a_globe_has_its_meridians_and_parallels() {
-        let at = |p: DVec3| globe(p).0;
-        assert_eq!(at(DVec3::Z), Vec2::new(0.5, 0.5));
-        assert_eq!(at(DVec3::X), Vec2::new(0.75, 0.5));
-        assert_eq!(at(DVec3::Y).y, 1.0);
-        // Partials against differences.
-        let p = DVec3::new(0.3, 0.5, -0.7) * 2.0;
-        let (uv, du, dv) = globe(p);
-        let place = |u: f64, v: f64| {
-            let (longitude, latitude) = ((u - 0.5) * 2.0, v - 0.5);
-            let (s, c) = (longitude * std::f64::consts::PI).sin_cos();
-            let (y, across) = (latitude * std::f64::consts::PI).sin_cos();
-            DVec3::new(s * across, y, c * across) * p.length()
-        };
-        let (u, v) = (f64::from(uv.x), f64::from(uv.y));
-        let h = 1e-5;
-        let by_u = (place(u + h, v) - place(u - h, v)) / (2.0 * h);
-        let by_v = (place(u, v + h) - place(u, v - h)) / (2.0 * h);
-        assert!((place(u, v) - p).length() < 1e-5);
-        assert!((by_u - du).length() < 1e-3 && (by_v - dv).length() < 1e-3);
     }
 }

@@ -58,7 +58,8 @@ impl Scene {
         /// Surfaces looked at.
         const MAX_SURFACES: usize = 1 << 12;
         let b = &self.bounds;
-        if !(p.cmpge(b.min).all() && p.cmple(b.max).all()) {
+        let is_within = p.cmpge(b.min).all() && p.cmple(b.max).all();
+        if !is_within && !self.world.is_endless() {
             return Interior::OUTSIDE;
         }
         // No direction that scenes are likely to be aligned with.

@@ -7,11 +7,13 @@
 
 mod build;
 mod desc;
+mod draft;
 mod lights;
 mod maps;
 mod media;
 mod place;
 mod requirements;
+mod solids;
 mod surface;
 
 pub use build::{Scene, SceneError, UnknownName};

@@ -8,13 +8,15 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3};
-use rayon::prelude::*;
 
 use super::build::{NameIndex, SceneError};
 use super::desc::{ObjectDesc, SceneDesc, ShapeDesc};
+use super::draft::{Draft, DraftLook, GeometryLooks};
+use super::lights::is_hidden;
 use super::maps::Maps;
-use crate::accel::{Geometry, Group, InstanceSet, World, rows_from_affine};
-use crate::geometry::{AnalyticShape, Disk, Sphere, TriangleMesh};
+use super::solids::uniform_scale;
+use crate::accel::{InstanceSet, World, rows_from_affine};
+use crate::geometry::{Plane, TriangleMesh};
 use crate::math::Bounds;
 
 /// The world to be traced, and what belongs to it.
@@ -31,54 +33,11 @@ pub(super) struct Placed {
     pub(super) center: DVec3,
 }
 
-/// What a primitive looks like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Look {
-    /// Index of its material.
-    pub(super) material: u32,
-    /// Index of its texture space.
-    pub(super) frame: u32,
-}
-
-/// The looks of one geometry.
-#[derive(Debug, Clone)]
-pub(super) enum GeometryLooks {
-    /// One for all primitives.
-    One(Look),
-    /// One for each primitive.
-    Each(Vec<Look>),
-}
-
-impl GeometryLooks {
-    #[inline]
-    pub(super) fn of(&self, primitive: u32) -> Look {
-        match self {
-            Self::One(look) => *look,
-            Self::Each(looks) => looks[primitive as usize],
-        }
-    }
-}
-
-/// What a group is made of before it is moved and rounded.
-#[derive(Debug, Default)]
-struct Draft {
-    /// (mesh, group from mesh).
-    meshes: Vec<(usize, DAffine3, DraftLook)>,
-    spheres: Vec<(Sphere, DraftLook)>,
-    disks: Vec<(Disk, DraftLook)>,
-    /// Copies of other drafts, by index.
-    copies: Vec<(usize, DAffine3)>,
-}
-
-/// A material, and where its textures lie: texture space from the group's, none where it has none.
-type DraftLook = (u32, Option<DAffine3>);
-
 /// Identity of a draft that several objects may share: what it holds, its material and, where that has
 /// textures, the bits of where they lie.
 #[derive(Debug, PartialEq, Eq, Hash)]
 enum Shared {
     Mesh(usize, u32, Option<[u64; 12]>),
-    UnitSphere(u32, Option<[u64; 12]>),
     Prototype(usize),
 }
 
@@ -161,6 +120,8 @@ pub(super) fn place(
         .collect();
 
     let copies = flatten(&root, &drafts).map_err(|e| vec![e])?;
+    let (mut root, mut drafts) = (root, drafts);
+    lift_planes(&mut root, &mut drafts, &copies);
     let bounds: Vec<Bounds> = drafts.iter().map(|d| d.bounds(&mesh_bounds)).collect();
     let mut world_bounds = root.bounds(&mesh_bounds);
     for (b, transforms) in bounds.iter().zip(&copies) {
@@ -174,8 +135,7 @@ pub(super) fn place(
 
     let mut placed = Placed { center, frames: vec![DAffine3::IDENTITY], ..Placed::default() };
     // A draft of nothing but copies is no group of its own.
-    let has_shapes =
-        |d: &Draft| !d.meshes.is_empty() || !d.spheres.is_empty() || !d.disks.is_empty();
+    let has_shapes = |d: &Draft| !d.meshes.is_empty() || !d.shapes.is_empty();
     let used = |d: &Draft, c: &[DAffine3]| !c.is_empty() && has_shapes(d);
     let mut uses_left = vec![0u32; meshes.len()];
     let kept = drafts.iter().zip(&copies).filter(|(d, c)| used(d, c)).map(|(d, _)| d);
@@ -184,10 +144,10 @@ pub(super) fn place(
     }
     let frames = &mut placed.frames;
     let mut group =
-        |draft: &Draft, origin: DVec3| draft.group(origin, &mut meshes, &mut uses_left, frames);
-    (placed.world.root, placed.root_looks) = group(&root, center);
-    for ((draft, transforms), bounds) in drafts.iter().zip(&copies).zip(&bounds) {
-        if !used(draft, transforms) {
+        |draft: Draft, origin: DVec3| draft.group(origin, &mut meshes, &mut uses_left, frames);
+    (placed.world.root, placed.root_looks) = group(root, center);
+    for ((draft, transforms), bounds) in drafts.into_iter().zip(&copies).zip(&bounds) {
+        if !used(&draft, transforms) {
             continue;
         }
         let origin = bounds.far_center();
@@ -236,10 +196,12 @@ impl Placer<'_> {
                 let textures = object.texture_transform.inverse();
                 (material, has_maps.then(|| textures * *object_from_group))
             };
-            if let ShapeDesc::Mesh(mesh) = object.shape
-                && !self.has_uvs[mesh]
-                && self.maps[material as usize].needs_uv()
-            {
+            let has_uvs = match object.shape {
+                ShapeDesc::Mesh(mesh) => self.has_uvs[mesh],
+                ShapeDesc::Quadric(_) => false,
+                _ => true,
+            };
+            if !has_uvs && self.maps[material as usize].needs_uv() {
                 self.errors.push(SceneError::NoTextureCoordinates {
                     at: object.at.clone(),
                     material: self.materials.name(material - 1).to_owned(),
@@ -257,49 +219,6 @@ impl Placer<'_> {
                     };
                     let shared = self.share(Shared::Mesh(mesh, material, bits(&look)), only);
                     self.copy(&mut draft, shared, m, &object);
-                }
-                ShapeDesc::Sphere { center, radius } => match uniform_scale(&m.matrix3) {
-                    Some(scale) => {
-                        let sphere =
-                            Sphere { center: m.transform_point3(center), radius: radius * scale };
-                        draft.spheres.push((sphere, look(&m.inverse())));
-                    }
-                    None if self.glows[material as usize] => {
-                        self.errors.push(SceneError::GlowingEllipsoid { at: object.at.clone() });
-                    }
-                    // An ellipsoid is a copy of the unit sphere.
-                    None => {
-                        let place = DAffine3::from_scale_rotation_translation(
-                            DVec3::splat(radius),
-                            glam::DQuat::IDENTITY,
-                            center,
-                        );
-                        let look = look(&place);
-                        let unit = Sphere { center: DVec3::ZERO, radius: 1.0 };
-                        let only = || Draft { spheres: vec![(unit, look)], ..Draft::default() };
-                        let shared = self.share(Shared::UnitSphere(material, bits(&look)), only);
-                        self.copy(&mut draft, shared, m * place, &object);
-                    }
-                },
-                ShapeDesc::Disk { center, normal, radius } => {
-                    let disk = Disk { center, normal: normal.normalize(), radius };
-                    match uniform_scale(&m.matrix3) {
-                        Some(scale) => {
-                            let center = m.transform_point3(center);
-                            // A mirror would turn a normal that is moved as a vector inside out.
-                            let normal = m.matrix3.inverse().transpose() * disk.normal;
-                            let disk =
-                                Disk { center, normal: normal.normalize(), radius: radius * scale };
-                            draft.disks.push((disk, look(&m.inverse())));
-                        }
-                        None => {
-                            let look = look(&DAffine3::IDENTITY);
-                            self.drafts
-                                .push(Draft { disks: vec![(disk, look)], ..Draft::default() });
-                            let own = self.drafts.len() - 1;
-                            self.copy(&mut draft, own, m, &object);
-                        }
-                    }
                 }
                 ShapeDesc::Instances { ref prototype, ref transforms } => {
                     let index = match self.prototype_names.find(prototype, "prototype") {
@@ -329,6 +248,13 @@ impl Placer<'_> {
                             name: prototype.name.clone(),
                         }),
                     }
+                }
+                ref shape => {
+                    let is_light = material > 0 && is_hidden(self.materials.name(material - 1));
+                    if self.glows[material as usize] && !is_light && !can_glow(shape, &m) {
+                        self.errors.push(SceneError::CannotGlow { at: object.at.clone() });
+                    }
+                    draft.add_shape(shape, &m, look(&m.inverse()));
                 }
             }
         }
@@ -363,97 +289,17 @@ impl Placer<'_> {
     }
 }
 
-impl Draft {
-    /// The box around its own meshes and spheres, before it is moved. A mesh counts by its own box.
-    fn bounds(&self, mesh_bounds: &[Bounds]) -> Bounds {
-        let meshes = self.meshes.iter().map(|(mesh, m, _)| mesh_bounds[*mesh].transformed(m));
-        let spheres = self.spheres.iter().map(|(sphere, _)| sphere.bounds());
-        let disks = self.disks.iter().map(|(disk, _)| disk.bounds());
-        meshes.chain(spheres).chain(disks).fold(Bounds::EMPTY, Bounds::union)
-    }
-
-    /// The group to be traced, relative to `origin`. A mesh's last use takes its buffers.
-    fn group(
-        &self,
-        origin: DVec3,
-        meshes: &mut [Option<TriangleMesh>],
-        uses_left: &mut [u32],
-        frames: &mut Vec<DAffine3>,
-    ) -> (Group, Vec<GeometryLooks>) {
-        let (mut geometries, mut looks) = (Vec::new(), Vec::new());
-        let mut look = |&(material, frame): &DraftLook| {
-            let Some(frame) = frame else { return Look { material, frame: 0 } };
-            frames.push(frame * DAffine3::from_translation(origin));
-            Look { material, frame: frames.len() as u32 - 1 }
-        };
-        for (index, transform, draft_look) in &self.meshes {
-            uses_left[*index] -= 1;
-            let slot = &mut meshes[*index];
-            let mesh = if uses_left[*index] == 0 { slot.take() } else { slot.clone() };
-            let Some(mesh) = mesh else { continue };
-            geometries.push(Geometry::Mesh(moved(mesh, transform, origin)));
-            looks.push(GeometryLooks::One(look(draft_look)));
-        }
-        if !self.spheres.is_empty() {
-            let moved =
-                self.spheres.iter().map(|(s, _)| Sphere { center: s.center - origin, ..*s });
-            geometries.push(Geometry::Spheres(Arc::new(moved.collect())));
-            looks.push(GeometryLooks::Each(self.spheres.iter().map(|(_, l)| look(l)).collect()));
-        }
-        if !self.disks.is_empty() {
-            let moved = self.disks.iter().map(|(d, _)| Disk { center: d.center - origin, ..*d });
-            geometries.push(Geometry::Disks(Arc::new(moved.collect())));
-            looks.push(GeometryLooks::Each(self.disks.iter().map(|(_, l)| look(l)).collect()));
-        }
-        (Group { geometries }, looks)
-    }
-}
-
 /// What tells one texture space from another.
 fn bits(look: &DraftLook) -> Option<[u64; 12]> {
     look.1.map(|frame| frame.to_cols_array().map(f64::to_bits))
 }
 
-/// The mesh in the space of its group: transformed and moved in f64, rounded once, in place.
-fn moved(mut mesh: TriangleMesh, transform: &DAffine3, group_origin: DVec3) -> TriangleMesh {
-    // group = transform · (origin + p) − group_origin
-    let m = DAffine3::from_translation(-group_origin)
-        * *transform
-        * DAffine3::from_translation(mesh.origin);
-    mesh.origin = DVec3::ZERO;
-    if m == DAffine3::IDENTITY {
-        return mesh;
+/// Whether points on a shape can be drawn at random, as light sources need.
+fn can_glow(shape: &ShapeDesc, m: &DAffine3) -> bool {
+    match shape {
+        ShapeDesc::Sphere { .. } => uniform_scale(&m.matrix3).is_some(),
+        _ => false,
     }
-    mesh.positions.as_flat_mut().par_chunks_exact_mut(3).with_min_len(1 << 12).for_each(|p| {
-        let world = m.transform_point3(DVec3::new(p[0].into(), p[1].into(), p[2].into()));
-        p.copy_from_slice(&world.as_vec3().to_array());
-    });
-    if m.matrix3 != DMat3::IDENTITY {
-        let normal_matrix = m.matrix3.inverse().transpose();
-        if let Some(normals) = &mut mesh.normals {
-            Arc::make_mut(normals).par_iter_mut().with_min_len(1 << 12).for_each(|n| {
-                *n = (normal_matrix * DVec3::from(n.map(f64::from)))
-                    .normalize_or_zero()
-                    .as_vec3()
-                    .to_array();
-            });
-        }
-        // A mirrored mesh stays right side out: counter-clockwise seen from outside.
-        if m.matrix3.determinant() < 0.0 {
-            Arc::make_mut(&mut mesh.triangles).par_iter_mut().for_each(|t| t.swap(1, 2));
-        }
-    }
-    mesh
-}
-
-/// The common factor of a transform that only rotates, mirrors and scales evenly.
-fn uniform_scale(m: &DMat3) -> Option<f64> {
-    let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
-    let scale = x.length();
-    let near = |value: f64, expected: f64| (value - expected).abs() <= 1e-12 * scale * scale;
-    let even = near(y.length_squared(), scale * scale) && near(z.length_squared(), scale * scale);
-    let square = near(x.dot(y), 0.0) && near(y.dot(z), 0.0) && near(z.dot(x), 0.0);
-    (even && square).then_some(scale)
 }
 
 fn check_transform(
@@ -499,6 +345,18 @@ fn flatten(root: &Draft, drafts: &[Draft]) -> Result<Vec<Vec<DAffine3>>, SceneEr
     Ok(copies)
 }
 
+/// Planes have no end, so that no box is around a copy of one: each copy becomes a plane of the world.
+fn lift_planes(root: &mut Draft, drafts: &mut [Draft], copies: &[Vec<DAffine3>]) {
+    for (draft, transforms) in drafts.iter_mut().zip(copies) {
+        for (plane, (material, frame)) in draft.take::<Plane>() {
+            for m in transforms {
+                let look = (material, frame.map(|frame| frame * m.inverse()));
+                root.add(plane.transformed(m), look);
+            }
+        }
+    }
+}
+
 /// What f32 ray queries cannot hold, of the recentred world and of its prototypes.
 fn out_of_range(world: &Bounds, prototypes: &[Bounds]) -> Vec<SceneError> {
     let mut errors = Vec::new();
@@ -539,15 +397,6 @@ fn is_singular(m: &DMat3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn even_scales_are_recognised() {
-        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 1.0);
-        assert!((uniform_scale(&(turn * 3.0)).unwrap() - 3.0).abs() < 1e-12);
-        let mirrored = turn * DMat3::from_diagonal(DVec3::new(-2.0, 2.0, 2.0));
-        assert!((uniform_scale(&mirrored).unwrap() - 2.0).abs() < 1e-12);
-        assert_eq!(uniform_scale(&DMat3::from_diagonal(DVec3::new(1.0, 1.0, 1.1))), None);
-    }
 
     #[test]
     fn flat_matrices_are_singular_at_any_scale() {

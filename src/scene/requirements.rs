@@ -37,8 +37,8 @@ impl Variant {
 pub struct Requirements {
     /// Triangles stored, in all groups.
     pub triangles: u64,
-    /// Spheres stored.
-    pub spheres: u64,
+    /// Other shapes stored: what one and what many are called, and how many.
+    pub shapes: Vec<([&'static str; 2], u64)>,
     /// Meshes with shading normals.
     pub smooth_meshes: u64,
     /// Groups that are copied.
@@ -47,8 +47,6 @@ pub struct Requirements {
     pub copies: u64,
     /// Primitives that rays meet, copies counted each.
     pub drawn_primitives: u64,
-    /// Disks stored.
-    pub disks: u64,
     /// Materials with a highlight.
     pub specular_materials: u64,
     /// Materials that mirror: mirrors, metals, `phong` with a mirror coefficient.
@@ -123,8 +121,13 @@ impl Requirements {
                     r.triangles += mesh.triangles.len() as u64;
                     r.smooth_meshes += u64::from(mesh.normals.is_some());
                 }
-                Geometry::Spheres(spheres) => r.spheres += spheres.len() as u64,
-                Geometry::Disks(disks) => r.disks += disks.len() as u64,
+                Geometry::Shapes(shapes) => {
+                    let (names, count) = (shapes.names(), shapes.len() as u64);
+                    match r.shapes.iter_mut().find(|(known, _)| *known == names) {
+                        Some((_, total)) => *total += count,
+                        None => r.shapes.push((names, count)),
+                    }
+                }
             }
         }
         r.prototypes = world.prototypes.len() as u64;

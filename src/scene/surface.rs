@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::build::Scene;
 use crate::accel::{Geometry, Hit, Transform3x4, affine_from_rows};
-use crate::geometry::{Disk, Sphere, TriangleMesh};
+use crate::geometry::{AnalyticShape, Shapes, TriangleMesh, with_shapes};
 use crate::material::Material;
 use crate::math::{Ray, gamma, offset_ray_origin};
 use crate::scene::desc::Epsilon;
@@ -44,10 +44,11 @@ impl Scene {
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint<'_> {
         // The short way: no transform, and a normal that always is there.
         if hit.copy.is_none()
-            && let Geometry::Spheres(spheres) = &self.world.root.geometries[hit.geometry as usize]
+            && let Geometry::Shapes(Shapes::Spheres(spheres)) =
+                &self.world.root.geometries[hit.geometry as usize]
         {
             let material_index = self.look(hit).material;
-            let local = on_sphere(&spheres[hit.primitive as usize], ray, hit.t, None);
+            let local = on_shape(&spheres[hit.primitive as usize], ray, hit, None);
             let is_front = local.normal.dot(ray.direction) <= 0.0;
             let normal = if is_front { local.normal } else { -local.normal };
             return SurfacePoint {
@@ -70,12 +71,9 @@ impl Scene {
         let transform = hit.copy.map(|copy| self.world.transform(copy));
         let local = match geometry {
             Geometry::Mesh(mesh) => on_triangle(mesh, hit),
-            Geometry::Spheres(spheres) => {
-                on_sphere(&spheres[hit.primitive as usize], ray, hit.t, transform)
-            }
-            Geometry::Disks(disks) => {
-                on_disk(&disks[hit.primitive as usize], ray, hit.t, transform)
-            }
+            Geometry::Shapes(shapes) => with_shapes!(shapes, list => {
+                on_shape(&list[hit.primitive as usize], ray, hit, transform)
+            }),
         };
         let placed = match transform {
             None => local,
@@ -162,19 +160,22 @@ fn on_triangle(mesh: &TriangleMesh, hit: &Hit) -> Local {
     }
 }
 
-/// The point of the sphere nearest to where the ray says it hit, in f64, rounded once.
+/// The point of a shape near to where the ray says it hit, in f64, rounded once.
 #[inline]
-fn on_sphere(sphere: &Sphere, ray: &Ray, t: f32, transform: Option<&Transform3x4>) -> Local {
-    let normal = sphere.normal_at(point_along(ray, t, transform));
-    let position = (sphere.center + normal * sphere.radius).as_vec3();
-    rounded_once(position, normal)
-}
-
-/// The point of the disk's plane nearest to where the ray says it hit, in f64, rounded once.
-#[inline]
-fn on_disk(disk: &Disk, ray: &Ray, t: f32, transform: Option<&Transform3x4>) -> Local {
-    let position = disk.nearest(point_along(ray, t, transform)).as_vec3();
-    rounded_once(position, disk.normal)
+fn on_shape(
+    shape: &impl AnalyticShape,
+    ray: &Ray,
+    hit: &Hit,
+    transform: Option<&Transform3x4>,
+) -> Local {
+    let point = shape.surface_at(point_along(ray, hit.t, transform), hit.part());
+    let (position, normal) = (point.position.as_vec3(), point.normal.as_vec3());
+    Local {
+        position,
+        error: gamma(2) * position.abs().max_element(),
+        geometric_normal: normal,
+        normal,
+    }
 }
 
 /// The point at distance `t` of a ray, in the space of its copy, in f64.
@@ -187,16 +188,6 @@ fn point_along(ray: &Ray, t: f32, transform: Option<&Transform3x4>) -> DVec3 {
         d = object_from_world.transform_vector3(d);
     }
     o + d * f64::from(t)
-}
-
-fn rounded_once(position: Vec3, normal: DVec3) -> Local {
-    let n = normal.as_vec3();
-    Local {
-        position,
-        error: gamma(2) * position.abs().max_element(),
-        geometric_normal: n,
-        normal: n,
-    }
 }
 
 /// From a copy's space to the world's.

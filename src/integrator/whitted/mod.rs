@@ -293,7 +293,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             let point = hits.points[lane].insert(scene.surface(&node.ray, hit));
             if F::EVERYTHING {
                 if scene.has_maps() {
-                    let cone = scene.widened(node.cone, hit);
+                    let cone = scene.widened(node.cone, hit, point.position);
                     let material = scene.apply_maps(hit, cone.width, point);
                     hits.textured.set(lane, cone, material);
                 }

@@ -1,7 +1,5 @@
 //! `[[lights]]` and `[medium]`.
 
-use glam::DVec3;
-
 use crate::color::Rgb;
 use crate::io::fields::{Fields, Reader};
 use crate::light::Falloff;
@@ -37,7 +35,7 @@ pub(super) fn light(reader: &Reader<'_>, fields: Fields<'_, '_>) -> Option<Light
         Kind::Point => point(&fields),
         Kind::Spot => spot(reader, &fields),
         Kind::Directional => {
-            let direction = direction(reader, &fields, "direction");
+            let direction = fields.require_direction("direction");
             let irradiance = fields.require_color("irradiance");
             direction
                 .zip(irradiance)
@@ -46,8 +44,8 @@ pub(super) fn light(reader: &Reader<'_>, fields: Fields<'_, '_>) -> Option<Light
         Kind::Rectangle => rectangle(reader, &fields),
         Kind::Disk => {
             let center = fields.require_vector("center");
-            let normal = direction(reader, &fields, "normal");
-            let radius = radius(&fields);
+            let normal = fields.require_direction("normal");
+            let radius = fields.require_positive("radius");
             let radiance = fields.require_color("radiance");
             (|| {
                 let (center, normal, radius) = (center?, normal?, radius?);
@@ -56,7 +54,7 @@ pub(super) fn light(reader: &Reader<'_>, fields: Fields<'_, '_>) -> Option<Light
         }
         Kind::Sphere => {
             let center = fields.require_vector("center");
-            let radius = radius(&fields);
+            let radius = fields.require_positive("radius");
             let radiance = fields.require_color("radiance");
             (|| Some(LightDesc::Sphere { center: center?, radius: radius?, radiance: radiance? }))()
         }
@@ -76,7 +74,7 @@ fn point(fields: &Fields<'_, '_>) -> Option<LightDesc> {
 
 fn spot(reader: &Reader<'_>, fields: &Fields<'_, '_>) -> Option<LightDesc> {
     let position = fields.require_vector("position");
-    let direction = direction(reader, fields, "direction");
+    let direction = fields.require_direction("direction");
     let intensity = fields.require_color("intensity");
     let angle = |name: &'static str, default: f64, max: f64| match fields.get(name) {
         None => Some(default),
@@ -116,21 +114,6 @@ fn rectangle(reader: &Reader<'_>, fields: &Fields<'_, '_>) -> Option<LightDesc> 
         return None;
     }
     Some(LightDesc::Rectangle { corner: corner?, edge_u, edge_v, radiance: radiance? })
-}
-
-fn radius(fields: &Fields<'_, '_>) -> Option<f64> {
-    fields.require("radius").and_then(|node| fields.positive(node, "radius"))
-}
-
-/// A vector of any length but zero.
-fn direction(reader: &Reader<'_>, fields: &Fields<'_, '_>, name: &'static str) -> Option<DVec3> {
-    let direction = fields.require_vector(name)?;
-    if direction.length() >= 1e-30 {
-        return Some(direction);
-    }
-    let span = fields.get(name).map_or(fields.span(), |node| node.span);
-    reader.mistake(span, format!("the `{name}` of a light must not be zero"));
-    None
 }
 
 /// Fog: homogeneous, thinning out upwards, or by distance alone.

@@ -4,24 +4,25 @@ mod camera;
 mod light;
 mod material;
 mod settings;
+mod shape;
 mod texture;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
 use super::document::{Document, Node, Value};
 use super::fields::{Fields, Reader};
 use super::mesh::read_mesh;
 use super::mistakes::Mistakes;
 use super::transforms::{affine, read_transforms, transform};
-use crate::geometry::TriangleMesh;
 use crate::scene::{ObjectDesc, PrototypeDesc, Reference, SceneDesc, ShapeDesc};
 use camera::{camera, image};
 use light::{fog, light};
 use material::material;
 use settings::settings;
+use shape::ShapeKind;
 use texture::Textures;
 
 /// What a document says, and what should be told about it.
@@ -216,73 +217,6 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         desc.map(|shape| ObjectDesc { at, shape, material, transform, texture_transform })
     }
 
-    fn shape(&mut self, fields: &Fields<'d, 'r>, kind: ShapeKind) -> Option<ShapeDesc> {
-        match kind {
-            ShapeKind::Sphere => {
-                fields.is("a sphere");
-                let center = fields.vector("center").unwrap_or(DVec3::ZERO);
-                let radius = fields.require("radius");
-                let radius = radius.and_then(|node| fields.positive(node, "radius"))?;
-                Some(ShapeDesc::Sphere { center, radius })
-            }
-            ShapeKind::Triangle => {
-                fields.is("a triangle");
-                let node = fields.require("points")?;
-                let xyz = self.points(node, "points")?;
-                if xyz.len() != 9 {
-                    self.reader.expected(node, "points", "three points");
-                    return None;
-                }
-                self.scene.meshes.push(inline_mesh(&xyz, vec![[0, 1, 2]]));
-                Some(ShapeDesc::Mesh(self.scene.meshes.len() - 1))
-            }
-            ShapeKind::Mesh => {
-                fields.is("a mesh");
-                let positions = fields.require("positions");
-                let triangles = fields.require("triangles");
-                let xyz = self.points(positions?, "positions")?;
-                let triangles = self.triangles(triangles?, xyz.len() / 3)?;
-                self.scene.meshes.push(inline_mesh(&xyz, triangles));
-                Some(ShapeDesc::Mesh(self.scene.meshes.len() - 1))
-            }
-        }
-    }
-
-    fn points(&self, node: &'d Node, name: &str) -> Option<Vec<f64>> {
-        if !matches!(node.value, Value::Array(_)) {
-            self.reader.expected(node, name, "a list of points");
-            return None;
-        }
-        let points = self.reader.list(node, name).iter();
-        let numbers: Option<Vec<[f64; 3]>> =
-            points.map(|point| self.reader.numbers::<3>(point, name)).collect();
-        let xyz: Vec<f64> = numbers?.into_iter().flatten().collect();
-        if let Some(x) = xyz.iter().find(|x| x.abs() > 1e18) {
-            self.reader.mistake(node.span, format!("`{name}` must lie within 1e18, not {x}"));
-            return None;
-        }
-        Some(xyz)
-    }
-
-    fn triangles(&self, node: &'d Node, vertices: usize) -> Option<Vec<[u32; 3]>> {
-        let mut triangles = Vec::new();
-        for item in self.reader.list(node, "triangles") {
-            let corners = self.reader.numbers::<3>(item, "triangles")?;
-            if let Some(bad) =
-                corners.iter().find(|&&i| i < 0.0 || i.fract() != 0.0 || i >= vertices as f64)
-            {
-                let message = format!(
-                    "triangle {} names vertex {bad}, but there are {vertices} (the first is 0)",
-                    triangles.len()
-                );
-                self.reader.mistake(item.span, message);
-                return None;
-            }
-            triangles.push(corners.map(|i| i as u32));
-        }
-        Some(triangles)
-    }
-
     fn mesh_file(&mut self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<usize> {
         let name = fields.text(node, "mesh")?;
         let path = self.folder.join(name);
@@ -351,23 +285,4 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         };
         Some(ShapeDesc::Instances { prototype, transforms })
     }
-}
-
-/// The values of `shape`.
-#[derive(Clone, Copy)]
-enum ShapeKind {
-    Sphere,
-    Triangle,
-    Mesh,
-}
-
-impl ShapeKind {
-    const ALL: [(&'static str, Self); 3] =
-        [("sphere", Self::Sphere), ("triangle", Self::Triangle), ("mesh", Self::Mesh)];
-}
-
-/// A mesh from numbers in the scene file, which are f64.
-fn inline_mesh(xyz: &[f64], triangles: Vec<[u32; 3]>) -> TriangleMesh {
-    let (origin, xyz) = super::mesh::place(xyz);
-    TriangleMesh { origin, ..TriangleMesh::new(xyz, triangles) }
 }

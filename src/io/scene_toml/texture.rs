@@ -256,11 +256,7 @@ fn marble<'d>(reader: &Reader<'d>, fields: &Fields<'d, '_>, node: &'d Node) -> O
 
 fn gradient<'d>(reader: &Reader<'d>, fields: &Fields<'d, '_>, node: &'d Node) -> Option<Texture> {
     let ramp = ramp(reader, node, "gradient");
-    let axis = fields.vector("axis").unwrap_or(DVec3::Y);
-    if axis.length() < 1e-30 {
-        let span = fields.get("axis").map_or(fields.span(), |node| node.span);
-        reader.mistake(span, "the `axis` of a gradient must not be zero");
-    }
+    let axis = fields.direction("axis", DVec3::Y).unwrap_or(DVec3::Y);
     let placement = placement(reader, fields);
     Some(Texture::Gradient(Gradient { axis, ramp: ramp?, placement }))
 }
