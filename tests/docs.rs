@@ -20,8 +20,9 @@ use glam::DVec3;
 const SCENE: &str = include_str!("../docs/scene.md");
 
 /// The pages of the reference.
-const REFERENCE: [(&str, &str); 3] = [
+const REFERENCE: [(&str, &str); 4] = [
     ("docs/scene.md", SCENE),
+    ("docs/shapes.md", include_str!("../docs/shapes.md")),
     ("docs/materials.md", include_str!("../docs/materials.md")),
     ("docs/lights.md", include_str!("../docs/lights.md")),
 ];

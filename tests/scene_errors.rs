@@ -174,3 +174,86 @@ fn files_that_a_scene_names_are_told_with_their_own_place() {
 fn an_empty_scene_is_no_mistake() {
     check("", "no mistake");
 }
+
+/// Each mistake of a shape, by itself.
+#[test]
+fn mistakes_of_shapes_are_told() {
+    for (fields, expected) in [
+        ("\"sphere\"\nradius = 0", "f.toml:3:10: `radius` must be above 0, not 0"),
+        (
+            "\"sphere\"\nradius = nan",
+            "f.toml:3:10: `radius` must be a finite number (within 1e30), not the number NaN",
+        ),
+        (
+            "\"box\"\nmin = [0, 0, 0]\nmax = [1, -1, 1]",
+            "f.toml:4:7: `max` must be greater than `min` along every axis; it is from [0, 0, 0] to [1, -1, 1]",
+        ),
+        (
+            "\"cylinder\"\nfrom = [1, 2, 3]\nto = [1, 2, 3]\nradius = 1",
+            "f.toml:4:6: `to` must differ from `from`",
+        ),
+        (
+            "\"cone\"\nfrom = [0, 0, 0]\nto = [0, 1, 0]\nradii = [0, 0]",
+            "f.toml:5:9: `radii` must not be below 0, nor both be 0",
+        ),
+        (
+            "\"cone\"\nfrom = [0, 0, 0]\nto = [0, 1, 0]\nradii = [0, 1]\nradius = 1",
+            "f.toml:6:10: a cone has either `radius` or `radii`",
+        ),
+        (
+            "\"torus\"\naxis = [0, 0, 0]\nmajor_radius = 1\nminor_radius = 0.5",
+            "f.toml:3:8: `axis` must not be zero",
+        ),
+        (
+            "\"torus\"\nmajor_radius = -1\nminor_radius = 0.5",
+            "f.toml:3:16: `major_radius` must not be below 0, as -1 is",
+        ),
+        (
+            "\"disk\"\nradius = 1\ninner_radius = 2",
+            "f.toml:4:16: `inner_radius` must be less than `radius`, 1",
+        ),
+        ("\"plane\"\nnormal = [0, 0, 0]", "f.toml:3:10: `normal` must not be zero"),
+        (
+            "\"quadric\"\ncoefficients = [0, 0, 0, 0, 0, 0, 0, 0, 0, 1]\nbounds = [[0, 0, 0], [1, 1, 1]]",
+            "f.toml:3:16: `coefficients` are those of x², y², z², xy, xz, yz, x, y, z and 1, of which the first nine must not all be 0",
+        ),
+        (
+            "\"quadric\"\ncoefficients = [1, 0, 0, 0, 0, 0, 0, 0, 0, 1]\nbounds = [[0, 0, 0], [1, 0, 1]]",
+            "f.toml:4:10: the second corner of `bounds` must be greater than the first along every axis; it is from [0, 0, 0] to [1, 0, 1]",
+        ),
+        (
+            "\"polygon\"\npoints = [[0, 0, 0], [1, 0, 0]]",
+            "f.toml:3:10: a polygon has three corners or more, not 2",
+        ),
+        (
+            "\"polygon\"\npoints = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]",
+            "f.toml:3:10: the `points` of a polygon span no area",
+        ),
+        (
+            "\"polygon\"\npoints = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]\nholes = [[[0.2, 0.2, 0], [0.4, 0.2, 0.1], [0.2, 0.4, 0]]]",
+            "f.toml:4:10: point 1 (counted from 0) is 1.000e-1 off the plane of the polygon; accepted: up to 1.000e-5",
+        ),
+    ] {
+        check(&format!("[[objects]]\nshape = {fields}\n"), expected);
+    }
+}
+
+/// What has no texture coordinates or cannot be sampled says so.
+#[test]
+fn what_a_shape_cannot_be_is_told() {
+    let quadric = "shape = \"quadric\"\ncoefficients = [1, 1, 1, 0, 0, 0, 0, 0, 0, -1]\nbounds = [[-1, -1, -1], [1, 1, 1]]";
+    check(
+        &format!(
+            "[materials.m]\ntype = \"diffuse\"\nreflectance = {{ checker = [0, 1], space = \"uv\" }}\n[[objects]]\n{quadric}\nmaterial = \"m\"\n"
+        ),
+        "f.toml:4:1: the texture of material `m` needs texture coordinates, which this object does not have; accepted: one with them, or a texture by position (for images `mapping` = \"planar\", \"spherical\" or \"cylindrical\")",
+    );
+    for shape in [quadric, "shape = \"plane\""] {
+        check(
+            &format!(
+                "[materials.m]\ntype = \"diffuse\"\nreflectance = 0\nemission = 1\n[[objects]]\n{shape}\nmaterial = \"m\"\n"
+            ),
+            "f.toml:5:1: this object cannot give off light; accepted with `emission`: meshes, and spheres of even scale",
+        );
+    }
+}
