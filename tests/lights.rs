@@ -3,10 +3,10 @@
 #![allow(missing_docs, reason = "a test program")]
 use alhazen::accel::{Accel, AccelKind, BuildOptions, Geometry, Group, RayQuery, World};
 use alhazen::color::Rgb;
-use alhazen::geometry::{Sphere, TriangleMesh};
-use alhazen::light::{DiskLight, Light, MeshLight, RectangleLight, SphereLight};
+use alhazen::geometry::{Disk, Shapes, Sphere, TriangleMesh};
+use alhazen::light::{DiskLight, Light, MeshLight, RectangleLight, ShapeLight, SphereLight};
 use alhazen::math::Ray;
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 mod common;
 use common::Random;
@@ -18,12 +18,12 @@ fn mesh(triangles: &[[DVec3; 3]]) -> Geometry {
     Geometry::Mesh(TriangleMesh::new(xyz, indices.collect()))
 }
 
-/// A light of one of four kinds around `at`, and what is to be seen of it.
+/// A light of one of five kinds around `at`, and what is to be seen of it.
 fn light(random: &mut Random, at: DVec3, size: f64) -> (Light, Geometry) {
     let radiance = Rgb::splat(1.0);
     let u = random.direction() * size * random.between(0.1, 1.0);
     let v = random.direction().cross(u).normalize() * size * random.between(0.1, 1.0);
-    match random.below(4) {
+    match random.below(5) {
         0 => {
             let triangles = [[at, at + u, at + u + v], [at, at + u + v, at + v]];
             let light = RectangleLight { corner: at, edge_u: u, edge_v: v, radiance };
@@ -44,12 +44,22 @@ fn light(random: &mut Random, at: DVec3, size: f64) -> (Light, Geometry) {
             let light = SphereLight { center: at, radius: size, radiance };
             (Light::Sphere(light), Geometry::Shapes(vec![sphere].into()))
         }
+        3 => {
+            let normal = random.direction();
+            let ring = Disk { center: at, normal, radius: size, inner_radius: 0.4 * size };
+            shape_light(vec![ring].into())
+        }
         _ => {
             let triangles = [[at, at + u, at + v]];
             let light = MeshLight::new(triangles.as_slice().into(), radiance, true);
             (Light::Mesh(light), mesh(&triangles))
         }
     }
+}
+
+fn shape_light(shapes: Shapes) -> (Light, Geometry) {
+    let light = ShapeLight::new(&shapes, 0, DAffine3::IDENTITY, Rgb::splat(1.0));
+    (Light::Shape(light.expect("it can shine")), Geometry::Shapes(shapes))
 }
 
 #[test]

@@ -253,7 +253,7 @@ fn what_a_shape_cannot_be_is_told() {
             &format!(
                 "[materials.m]\ntype = \"diffuse\"\nreflectance = 0\nemission = 1\n[[objects]]\n{shape}\nmaterial = \"m\"\n"
             ),
-            "f.toml:5:1: this object cannot give off light; accepted with `emission`: meshes, and spheres of even scale",
+            "f.toml:5:1: this object cannot give off light; accepted with `emission`: meshes, and all shapes but `plane` and `quadric`",
         );
     }
 }

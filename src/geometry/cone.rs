@@ -1,9 +1,11 @@
 //! Cylinders, cones and truncated cones, solved in f64.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::{DVec2, DVec3};
 
 use super::shape::{Stretch, longitude, outward};
-use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
+use super::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
 /// A round body around +Y from the origin up; a cylinder, where both radii are equal.
@@ -128,6 +130,29 @@ impl AnalyticShape for Cone {
         }
         let least = LEAST * self.radii[0].max(self.radii[1]);
         1.0 / (p.x.hypot(p.z).max(least) * self.slope().hypot(1.0))
+    }
+
+    fn sampled_parts(&self) -> u8 {
+        if self.has_caps { 3 } else { 1 }
+    }
+
+    fn sample_at(&self, part: u8, place: DVec2) -> Option<SampledPoint> {
+        let (sin, cos) = (TAU * place.x).sin_cos();
+        let out = DVec3::new(sin, 0.0, cos);
+        if part == SIDE {
+            let k = self.slope();
+            let y = place.y * self.height;
+            let rho = self.radii[0] + k * y;
+            let area = (out - DVec3::Y * k) * (TAU * rho * self.height);
+            return Some(SampledPoint { position: out * rho + DVec3::Y * y, area });
+        }
+        // A ring's area grows with its radius.
+        let is_top = part == CAPS[1];
+        let radius = self.radii[usize::from(is_top)];
+        let (y, side) = if is_top { (self.height, 1.0) } else { (0.0, -1.0) };
+        let position = out * (radius * place.y.sqrt()) + DVec3::Y * y;
+        let area = DVec3::Y * (side * PI * radius * radius);
+        Some(SampledPoint { position, area })
     }
 
     /// The farther of the two rims.

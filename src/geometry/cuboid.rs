@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
+use super::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
 /// A box whose edges are parallel to the axes. Part 2·axis is the face at the least coordinate,
@@ -86,6 +86,22 @@ impl AnalyticShape for Cuboid {
 
     fn curvature(&self, _p: DVec3, _part: u8) -> f64 {
         0.0
+    }
+
+    fn sampled_parts(&self) -> u8 {
+        6
+    }
+
+    fn sample_at(&self, part: u8, place: DVec2) -> Option<SampledPoint> {
+        let (axis, _) = face(part);
+        let size = self.bounds.size();
+        let mut offset = DVec3::ZERO;
+        offset[(axis + 1) % 3] = place.x;
+        offset[(axis + 2) % 3] = place.y;
+        let ShapePoint { position, normal } =
+            self.surface_at(self.bounds.min + offset * size, part);
+        let area = size[(axis + 1) % 3] * size[(axis + 2) % 3];
+        Some(SampledPoint { position, area: normal * area })
     }
 }
 

@@ -1,9 +1,11 @@
 //! Flat disks and rings, solved in f64.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::{DQuat, DVec2, DVec3};
 
 use super::shape::longitude;
-use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
+use super::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
 /// A flat disk, or the ring that is left of it without a smaller one.
@@ -67,6 +69,20 @@ impl AnalyticShape for Disk {
 
     fn curvature(&self, _p: DVec3, _part: u8) -> f64 {
         0.0
+    }
+
+    fn sampled_parts(&self) -> u8 {
+        1
+    }
+
+    fn sample_at(&self, _part: u8, place: DVec2) -> Option<SampledPoint> {
+        let turn = DQuat::from_rotation_arc(DVec3::Y, self.normal);
+        let (sin, cos) = (TAU * place.x).sin_cos();
+        // A ring's area grows with its radius.
+        let [inner, outer] = [self.inner_radius, self.radius].map(|r| r * r);
+        let r = (inner + (outer - inner) * place.y).sqrt();
+        let position = self.center + turn * DVec3::new(sin * r, 0.0, cos * r);
+        Some(SampledPoint { position, area: self.normal * (PI * (outer - inner)) })
     }
 
     fn reach(&self, direction: DVec3) -> f64 {

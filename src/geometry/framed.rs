@@ -1,8 +1,8 @@
 //! Shapes under an affine transform, inverted in f64: turned, stretched, sheared, mirrored.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
-use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
+use super::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
 /// A shape that is described in a space of its own.
@@ -85,6 +85,21 @@ impl<S: AnalyticShape> AnalyticShape for Framed<S> {
     fn curvature(&self, p: DVec3, part: u8) -> f64 {
         let inner = self.shape.curvature(self.inner_from_outer.transform_point3(p), part);
         inner / self.outer_from_inner.matrix3.determinant().abs().cbrt()
+    }
+
+    fn sampled_parts(&self) -> u8 {
+        self.shape.sampled_parts()
+    }
+
+    fn sample_at(&self, part: u8, place: DVec2) -> Option<SampledPoint> {
+        let inner = self.shape.sample_at(part, place)?;
+        // An area goes by the cofactors.
+        let m = &self.outer_from_inner;
+        let cofactors = self.inner_from_outer.matrix3.transpose() * m.matrix3.determinant().abs();
+        Some(SampledPoint {
+            position: m.transform_point3(inner.position),
+            area: cofactors * inner.area,
+        })
     }
 
     fn reach(&self, direction: DVec3) -> f64 {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
+use super::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
 /// A flat polygon: what lies within an odd number of its loops.
@@ -177,5 +177,27 @@ impl AnalyticShape for Polygon {
 
     fn curvature(&self, _p: DVec3, _part: u8) -> f64 {
         0.0
+    }
+
+    fn sampled_parts(&self) -> u8 {
+        1
+    }
+
+    /// Onto the smallest rectangle along its first edge that holds it; none beside the polygon.
+    fn sample_at(&self, _part: u8, place: DVec2) -> Option<SampledPoint> {
+        let Parameters { dp_du, dp_dv, .. } = self.parameters(self.point(), 0);
+        let corner = |p: &DVec3| {
+            let off = *p - self.point();
+            DVec2::new(off.dot(dp_du), off.dot(dp_dv))
+        };
+        let corners = || self.loops[0].iter().map(corner);
+        let low = corners().fold(DVec2::INFINITY, DVec2::min);
+        let size = corners().fold(DVec2::NEG_INFINITY, DVec2::max) - low;
+        let at = low + place * size;
+        let position = self.point() + dp_du * at.x + dp_dv * at.y;
+        let area = self.normal * (size.x * size.y);
+        // Looked at from the front.
+        let eye = position + self.normal * size.max_element();
+        self.is_crossed(eye, -self.normal).then_some(SampledPoint { position, area })
     }
 }

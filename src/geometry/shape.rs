@@ -44,6 +44,15 @@ pub struct Parameters {
     pub dp_dv: DVec3,
 }
 
+/// A point that a place in the unit square is mapped to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampledPoint {
+    /// Position.
+    pub position: DVec3,
+    /// The outward normal, as long as the area that a unit of the square becomes there.
+    pub area: DVec3,
+}
+
 /// A shape that is solved as a whole, in f64, in a space of its own.
 ///
 /// What is said of a point (all but the intersection) is asked for points that a ray was found to hit, off
@@ -75,6 +84,17 @@ pub trait AnalyticShape: Clone + Debug + Send + Sync + 'static {
 
     /// About how far the normal turns for each unit of distance along the surface, at most.
     fn curvature(&self, p: DVec3, part: u8) -> f64;
+
+    /// Parts of the surface on which points can be drawn at random. Where there is none, the shape cannot be a
+    /// light.
+    fn sampled_parts(&self) -> u8 {
+        0
+    }
+
+    /// A map from the unit square onto such a part. None at places that are off the surface.
+    fn sample_at(&self, _part: u8, _place: DVec2) -> Option<SampledPoint> {
+        None
+    }
 
     /// How far it reaches: the largest dot product of one of its points with `direction`, which may have
     /// any length. By its box, where a shape does not know better.

@@ -1,9 +1,11 @@
 //! Spheres, solved in f64.
 
+use std::f64::consts::TAU;
+
 use glam::{DVec2, DVec3};
 
 use super::shape::longitude;
-use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
+use super::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
 /// A sphere, in the space of its group.
@@ -73,6 +75,20 @@ impl AnalyticShape for Sphere {
 
     fn curvature(&self, _p: DVec3, _part: u8) -> f64 {
         1.0 / self.radius
+    }
+
+    fn sampled_parts(&self) -> u8 {
+        1
+    }
+
+    /// By longitude and height, which keeps areas (Archimedes).
+    fn sample_at(&self, _part: u8, place: DVec2) -> Option<SampledPoint> {
+        let y = 2.0 * place.y - 1.0;
+        let (sin, cos) = (TAU * place.x).sin_cos();
+        let across = (1.0 - y * y).max(0.0).sqrt();
+        let n = DVec3::new(across * sin, y, across * cos);
+        let area = 2.0 * TAU * self.radius * self.radius;
+        Some(SampledPoint { position: self.center + n * self.radius, area: n * area })
     }
 
     fn reach(&self, direction: DVec3) -> f64 {

@@ -1,9 +1,11 @@
 //! Tori, solved in f64.
 
+use std::f64::consts::TAU;
+
 use glam::{DVec2, DVec3};
 
 use super::shape::{Stretch, longitude, outward};
-use super::{AnalyticShape, Parameters, ShapeHit, ShapePoint};
+use super::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
 use crate::math::{Bounds, Quartic};
 
 /// A torus around +Y at the origin. Where the tube is wider than the ring it is a spindle: both its apple
@@ -105,13 +107,28 @@ impl AnalyticShape for Torus {
     fn parameters(&self, p: DVec3, _part: u8) -> Parameters {
         let (u, dp_du) = longitude(p);
         let from_ring = p.x.hypot(p.z) - self.ring(p);
-        let v = 0.5 + p.y.atan2(from_ring) / std::f64::consts::TAU;
-        let dp_dv = (DVec3::Y * from_ring - outward(p) * p.y) * std::f64::consts::TAU;
+        let v = 0.5 + p.y.atan2(from_ring) / TAU;
+        let dp_dv = (DVec3::Y * from_ring - outward(p) * p.y) * TAU;
         Parameters { uv: DVec2::new(u, v), dp_du, dp_dv }
     }
 
     fn curvature(&self, _p: DVec3, _part: u8) -> f64 {
         1.0 / self.minor_radius
+    }
+
+    fn sampled_parts(&self) -> u8 {
+        1
+    }
+
+    fn sample_at(&self, _part: u8, place: DVec2) -> Option<SampledPoint> {
+        let (sin, cos) = (TAU * place.x).sin_cos();
+        let out = DVec3::new(sin, 0.0, cos);
+        let (up, along) = (TAU * place.y).sin_cos();
+        let n = out * along + DVec3::Y * up;
+        // Below zero on the lemon of a spindle, where the normal is another.
+        let rho = self.major_radius + self.minor_radius * along;
+        let position = out * self.major_radius + n * self.minor_radius;
+        Some(SampledPoint { position, area: n * (TAU * TAU * rho * self.minor_radius) })
     }
 
     fn reach(&self, d: DVec3) -> f64 {

@@ -11,6 +11,7 @@ mod mesh;
 #[cfg(test)]
 mod oracle;
 mod rectangle;
+mod shape;
 mod sphere;
 mod tree;
 
@@ -24,6 +25,7 @@ pub use delta::{DirectionalLight, Falloff, PointLight, SpotLight};
 pub use disk::DiskLight;
 pub use mesh::MeshLight;
 pub use rectangle::RectangleLight;
+pub use shape::ShapeLight;
 pub use sphere::SphereLight;
 pub use tree::{LightTree, PickedLight};
 
@@ -44,6 +46,8 @@ pub enum Light {
     Sphere(SphereLight),
     /// Triangles.
     Mesh(MeshLight),
+    /// A shape that is neither.
+    Shape(ShapeLight),
 }
 
 /// What arrives at a point from one light, if nothing is in between.
@@ -81,6 +85,7 @@ impl Light {
             Self::Disk(light) => light.sample(p, u),
             Self::Sphere(light) => light.sample(p, u),
             Self::Mesh(light) => light.sample(p, u),
+            Self::Shape(light) => light.sample(p, u),
         }
     }
 
@@ -109,6 +114,7 @@ impl Light {
                 let sides = if light.two_sided() { 2.0 } else { 1.0 };
                 scaled(light.radiance(), sides * PI * light.area())
             }
+            Self::Shape(light) => scaled(light.radiance(), TAU * light.area()),
         }
     }
 
@@ -122,6 +128,7 @@ impl Light {
             Self::Disk(light) => Some(light.bounds()),
             Self::Sphere(light) => Some(light.bounds()),
             Self::Mesh(light) => Some(light.bounds()),
+            Self::Shape(light) => Some(light.bounds()),
         }
     }
 }
@@ -132,7 +139,8 @@ mod tests {
     use std::f64::consts::PI;
     use std::sync::Arc;
 
-    use glam::DVec3;
+    use crate::geometry::{Framed, Torus};
+    use glam::{DAffine3, DVec3};
     use proptest::prelude::*;
 
     /// One light of each kind, `scale` in size, around `at`.
@@ -140,6 +148,11 @@ mod tests {
         let radiance = Rgb::new(1.0, 0.0, 2.0);
         let (u, v) = (DVec3::new(2.0, 0.0, 0.5) * scale, DVec3::new(-0.5, 0.0, 2.0) * scale);
         let triangles = Arc::from([[at, at + u, at + v], [at, at + v, at - u]]);
+        let torus = vec![Framed::new(
+            Torus { major_radius: 0.7, minor_radius: 0.3 },
+            DAffine3::from_scale(DVec3::splat(scale.max(1e-9))),
+        )];
+        let place = DAffine3::from_translation(at);
         let position = at;
         let falloff = Falloff::InverseSquare;
         vec![
@@ -158,6 +171,7 @@ mod tests {
             Light::Sphere(SphereLight { center: at, radius: scale, radiance }),
             Light::Mesh(MeshLight::new(Arc::clone(&triangles), radiance, false)),
             Light::Mesh(MeshLight::new(triangles, radiance, true)),
+            Light::Shape(ShapeLight::new(&torus.into(), 0, place, radiance).expect("it can shine")),
         ]
     }
 

@@ -196,7 +196,7 @@ pub enum SceneError {
     },
     /// A shape cannot be sampled as a light.
     #[error(
-        "{at}: this object cannot give off light; accepted with `emission`: meshes, and spheres of even scale"
+        "{at}: this object cannot give off light; accepted with `emission`: meshes, and all shapes but `plane` and `quadric`"
     )]
     CannotGlow {
         /// The object; that of a copy is not known.

@@ -9,18 +9,22 @@ use super::build::SceneError;
 use super::desc::{LightDesc, Location, MaterialDesc, ObjectDesc, Reference, SceneDesc, ShapeDesc};
 use super::draft::GeometryLooks;
 use super::place::Placed;
+use super::solids::uniform_scale;
 use crate::accel::{Geometry, affine_from_rows};
 use crate::camera::Pose;
 use crate::color::Rgb;
 use crate::geometry::{Shapes, TriangleMesh};
 use crate::light::{
-    DirectionalLight, DiskLight, Light, MeshLight, PointLight, RectangleLight, SphereLight,
-    SpotLight,
+    DirectionalLight, DiskLight, Light, MeshLight, PointLight, RectangleLight, ShapeLight,
+    SphereLight, SpotLight,
 };
 use crate::material::Material;
 
 /// Names that begin like this are ours: no person can write them.
 const HIDDEN: char = '\0';
+
+/// How even the scales of a copy must be: it is in f32.
+const COPIES_ARE_EVEN: f64 = 1e-5;
 
 /// Triangles of glowing objects in all, copies counted each.
 const MAX_TRIANGLES: u64 = 20_000_000;
@@ -147,25 +151,26 @@ pub(super) fn glowing_objects(
                 let light = MeshLight::new(all, emission.radiance, emission.is_two_sided);
                 lights.push(Light::Mesh(light));
             }
-            Geometry::Shapes(Shapes::Spheres(spheres)) => {
-                for (i, sphere) in spheres.iter().enumerate() {
-                    let Some(emission) = glow(i) else { continue };
-                    // Copies are in f32: even to within its rounding.
-                    let axes = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis];
-                    let scale = m.matrix3.determinant().abs().cbrt();
-                    let is_even = |axis: &DVec3| (axis.length() / scale - 1.0).abs() < 1e-5;
-                    if !axes.iter().all(is_even) {
-                        return Err(SceneError::CannotGlow { at: Location::default() });
-                    }
-                    lights.push(Light::Sphere(SphereLight {
-                        center: m.transform_point3(sphere.center),
-                        radius: sphere.radius * scale,
-                        radiance: emission.radiance,
-                    }));
+            Geometry::Shapes(shapes) => {
+                let scale = uniform_scale(&m.matrix3, COPIES_ARE_EVEN);
+                for i in 0..shapes.len() {
+                    let Some(Emission { radiance, .. }) = glow(i) else { continue };
+                    // Spheres are sampled by the angle that they are seen at.
+                    let light = match (shapes, scale) {
+                        (Shapes::Spheres(spheres), Some(scale)) => {
+                            let center = m.transform_point3(spheres[i].center);
+                            let radius = spheres[i].radius * scale;
+                            Light::Sphere(SphereLight { center, radius, radiance })
+                        }
+                        _ => {
+                            let light = ShapeLight::new(shapes, i, m, radiance);
+                            let at = Location::default();
+                            Light::Shape(light.ok_or(SceneError::CannotGlow { at })?)
+                        }
+                    };
+                    lights.push(light);
                 }
             }
-            // Others are lights already, or refused before.
-            Geometry::Shapes(_) => {}
         }
         Ok(())
     };

@@ -12,9 +12,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::build::{NameIndex, SceneError};
 use super::desc::{ObjectDesc, SceneDesc, ShapeDesc};
 use super::draft::{Draft, DraftLook, GeometryLooks};
-use super::lights::is_hidden;
 use super::maps::Maps;
-use super::solids::uniform_scale;
 use crate::accel::{InstanceSet, World, rows_from_affine};
 use crate::geometry::{Plane, TriangleMesh};
 use crate::math::Bounds;
@@ -250,8 +248,7 @@ impl Placer<'_> {
                     }
                 }
                 ref shape => {
-                    let is_light = material > 0 && is_hidden(self.materials.name(material - 1));
-                    if self.glows[material as usize] && !is_light && !can_glow(shape, &m) {
+                    if self.glows[material as usize] && !can_glow(shape) {
                         self.errors.push(SceneError::CannotGlow { at: object.at.clone() });
                     }
                     draft.add_shape(shape, &m, look(&m.inverse()));
@@ -295,11 +292,8 @@ fn bits(look: &DraftLook) -> Option<[u64; 12]> {
 }
 
 /// Whether points on a shape can be drawn at random, as light sources need.
-fn can_glow(shape: &ShapeDesc, m: &DAffine3) -> bool {
-    match shape {
-        ShapeDesc::Sphere { .. } => uniform_scale(&m.matrix3).is_some(),
-        _ => false,
-    }
+fn can_glow(shape: &ShapeDesc) -> bool {
+    !matches!(shape, ShapeDesc::Plane { .. } | ShapeDesc::Quadric(_))
 }
 
 fn check_transform(

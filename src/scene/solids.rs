@@ -12,7 +12,7 @@ impl Draft {
     /// Adds a shape that is no mesh, group from object by `m`.
     pub(super) fn add_shape(&mut self, shape: &ShapeDesc, m: &DAffine3, look: DraftLook) {
         match *shape {
-            ShapeDesc::Sphere { center, radius } => match uniform_scale(&m.matrix3) {
+            ShapeDesc::Sphere { center, radius } => match uniform_scale(&m.matrix3, EVEN) {
                 Some(scale) => {
                     let center = m.transform_point3(center);
                     self.add(Sphere { center, radius: radius * scale }, look);
@@ -21,7 +21,7 @@ impl Draft {
             },
             ShapeDesc::Disk { center, normal, radius, inner_radius } => {
                 let disk = Disk { center, normal: normal.normalize(), radius, inner_radius };
-                match uniform_scale(&m.matrix3) {
+                match uniform_scale(&m.matrix3, EVEN) {
                     Some(scale) => {
                         let plane = Plane { point: center, normal: disk.normal }.transformed(m);
                         let disk = Disk {
@@ -71,11 +71,14 @@ fn upright(foot: DVec3, axis: DVec3) -> DAffine3 {
     DAffine3::from_rotation_translation(turn, foot)
 }
 
-/// The common factor of a transform that only rotates, mirrors and scales evenly.
-pub(super) fn uniform_scale(m: &DMat3) -> Option<f64> {
+/// How even the scales of an object's own transform must be.
+pub(super) const EVEN: f64 = 1e-12;
+
+/// The common factor of a transform that only rotates, mirrors and scales evenly, to within `tolerance`.
+pub(super) fn uniform_scale(m: &DMat3, tolerance: f64) -> Option<f64> {
     let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
     let scale = x.length();
-    let near = |value: f64, expected: f64| (value - expected).abs() <= 1e-12 * scale * scale;
+    let near = |value: f64, expected: f64| (value - expected).abs() <= tolerance * scale * scale;
     let even = near(y.length_squared(), scale * scale) && near(z.length_squared(), scale * scale);
     let square = near(x.dot(y), 0.0) && near(y.dot(z), 0.0) && near(z.dot(x), 0.0);
     (even && square).then_some(scale)
@@ -88,9 +91,9 @@ mod tests {
     #[test]
     fn even_scales_are_recognised() {
         let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 1.0);
-        assert!((uniform_scale(&(turn * 3.0)).unwrap() - 3.0).abs() < 1e-12);
+        assert!((uniform_scale(&(turn * 3.0), EVEN).unwrap() - 3.0).abs() < 1e-12);
         let mirrored = turn * DMat3::from_diagonal(DVec3::new(-2.0, 2.0, 2.0));
-        assert!((uniform_scale(&mirrored).unwrap() - 2.0).abs() < 1e-12);
-        assert_eq!(uniform_scale(&DMat3::from_diagonal(DVec3::new(1.0, 1.0, 1.1))), None);
+        assert!((uniform_scale(&mirrored, EVEN).unwrap() - 2.0).abs() < 1e-12);
+        assert_eq!(uniform_scale(&DMat3::from_diagonal(DVec3::new(1.0, 1.0, 1.1)), EVEN), None);
     }
 }
