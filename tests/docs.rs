@@ -268,6 +268,20 @@ fn texture(kind: &str, field: &str) -> String {
     within("diffuse", "reflectance", &[kind, field])
 }
 
+/// The headings of shapes that are called so in scene files.
+const SHAPES: [&str; 10] = [
+    " Sphere",
+    " Box",
+    " Cylinder",
+    " Cone",
+    " Torus",
+    " Disk",
+    " Plane",
+    " Quadric",
+    " Polygon",
+    " Triangle",
+];
+
 const TEXTURES: [(&str, &str); 5] = [
     (" `image`", "image = \"a.png\""),
     (" `checker`", "checker = [0, 1]"),
@@ -294,15 +308,26 @@ fn the_reference_has_every_field_and_no_other() {
         ),
         (vec![" `[render]`"], vec!["[render]\nzzz = 1".into()]),
         (vec![" `[ambient]`"], vec!["[ambient]\nzzz = 1".into()]),
-        (vec![" `[[objects]]`", " Sphere"], vec![object("shape = \"sphere\"")]),
-        (vec![" `[[objects]]`", " Triangle"], vec![object("shape = \"triangle\"")]),
         (vec![" `[[objects]]`", " Mesh in the scene file"], vec![object("shape = \"mesh\"")]),
         (vec![" `[[objects]]`", " Mesh from a file"], vec![object("mesh = \"a.ply\"")]),
         (vec![" `[[objects]]`", " Instance"], vec![object("instance = \"a\"")]),
+        (
+            vec![" Strewn copies"],
+            ["mesh = \"a.ply\"", "bounds = [[0, 0, 0], [1, 1, 1]]"]
+                .map(|over| {
+                    let scatter = format!("{{ count = 1, {over}, zzz = 1 }}");
+                    format!("[[objects]]\ninstance = \"a\"\nscatter = {scatter}")
+                })
+                .to_vec(),
+        ),
         (vec![" Transforms"], vec!["[camera]\ntransform = [{ zzz = 1 }]".into()]),
         (vec![" `[prototypes.NAME]`"], vec!["[prototypes.a]\nzzz = 1".into()]),
         (vec![" Colour ramps"], vec![texture("noise = [{ zzz = 1 }]", "seed = 1")]),
     ];
+    for heading in SHAPES {
+        let shape = object(&format!("shape = \"{}\"", heading.trim().to_lowercase()));
+        cases.push((vec![" `[[objects]]`", heading], vec![shape]));
+    }
     for kind in ["diffuse", "phong", "mirror", "conductor", "dielectric"] {
         cases.push((vec![" `[materials.NAME]`", heading(kind)], vec![material(kind)]));
     }

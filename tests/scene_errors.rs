@@ -257,3 +257,39 @@ fn what_a_shape_cannot_be_is_told() {
         );
     }
 }
+
+/// Copies that are strewn.
+#[test]
+fn mistakes_of_scatter_are_told() {
+    for (scatter, expected) in [
+        ("count = 5", "`scatter` has one of the fields `mesh` and `bounds`"),
+        ("bounds = [[0, 0, 0], [1, 1, 1]]", "scatter lacks the field `count`"),
+        (
+            "count = -1, bounds = [[0, 0, 0], [1, 1, 1]]",
+            "`count` must be a whole number from 0 to 200000000, not the number -1",
+        ),
+        (
+            "count = 5, bounds = [[0, 0, 0], [1, -1, 1]]",
+            "`bounds` must be [[least x, y, z], [greatest x, y, z]]",
+        ),
+        (
+            "count = 5, bounds = [[0, 0, 0], [1, 1, 1]], scale = [2, 1]",
+            "`scale` must be [least, greatest], both above 0",
+        ),
+        (
+            "count = 5, bounds = [[0, 0, 0], [1, 1, 1]], turn = \"upp\"",
+            "unknown turn `upp` (did you mean `up`?); accepted: none, up, any",
+        ),
+        (
+            "count = 5, bounds = [[0, 0, 0], [1, 1, 1]], follow_surface = true",
+            "unknown field `follow_surface` in scatter; accepted: count, seed, turn, scale, mesh, bounds",
+        ),
+    ] {
+        let text = format!(
+            "[[prototypes.b.objects]]\nshape = \"sphere\"\nradius = 1\n[[objects]]\ninstance = \"b\"\nscatter = {{ {scatter} }}\n"
+        );
+        let found = mistakes(&text);
+        assert!(found.ends_with(expected), "{found}");
+        assert_eq!(found.lines().count(), 1, "{found}");
+    }
+}

@@ -109,7 +109,7 @@ impl<S: AnalyticShape> Case<'_, S> {
             } else if i % 16 == 3 {
                 // Along an axis.
                 let axis = [DVec3::X, DVec3::Y, DVec3::Z][(random.bits() % 3) as usize];
-                d = if random.bits() % 2 == 0 { axis } else { -axis };
+                d = if random.unit() < 0.5 { axis } else { -axis };
             }
             let back = distance * self.size;
             let origin = p - d * back;

@@ -9,7 +9,7 @@ use super::LightSample;
 use super::aim::{aim, lift, scaled};
 use super::bounds::{Cone, LightBounds, strength};
 use crate::color::Rgb;
-use crate::geometry::{AnalyticShape, Framed, SampledPoint, Shapes, with_shapes};
+use crate::geometry::{AnalyticShape, SampledPoint, Shapes, with_shapes};
 use crate::math::Bounds;
 
 /// An analytic shape of constant radiance, on both sides.
@@ -48,8 +48,7 @@ impl ShapeLight {
     /// `radiance` (W·m⁻²·sr⁻¹) to both sides. None where points cannot be drawn on it.
     pub fn new(shapes: &Shapes, index: usize, place: DAffine3, radiance: Rgb) -> Option<Self> {
         let (parts, bounds) = with_shapes!(shapes, list => {
-            let framed = Framed::new(list[index].clone(), place);
-            (list[index].sampled_parts(), framed.bounds())
+            (list[index].sampled_parts(), list[index].bounds().transformed(&place))
         });
         let empty = Arc::from([]);
         let shapes = shapes.clone();
@@ -139,7 +138,7 @@ mod tests {
     use super::super::Light;
     use super::super::oracle::{assert_vector_irradiance, vector_irradiance};
     use super::*;
-    use crate::geometry::{Cone as Frustum, Cuboid, Disk, Polygon, Sphere, Torus};
+    use crate::geometry::{Cone as Frustum, Cuboid, Disk, Framed, Polygon, Sphere, Torus};
     use std::f64::consts::TAU;
 
     /// The vector irradiance of a surface on both sides, from small triangles of it.

@@ -13,6 +13,7 @@ mod maps;
 mod media;
 mod place;
 mod requirements;
+mod scatter;
 mod solids;
 mod surface;
 
@@ -24,4 +25,5 @@ pub use desc::{
 pub use maps::{Cone, Maps};
 pub use media::Crossing;
 pub use requirements::{Requirements, Variant};
+pub use scatter::{Scatter, Turn};
 pub use surface::SurfacePoint;

@@ -1,6 +1,7 @@
 //! Our own scene format: tables become a [`SceneDesc`]. The format is described in `docs/scene.md`.
 
 mod camera;
+mod instance;
 mod light;
 mod material;
 mod settings;
@@ -12,11 +13,11 @@ use std::path::{Path, PathBuf};
 
 use glam::DAffine3;
 
-use super::document::{Document, Node, Value};
+use super::document::{Document, Node};
 use super::fields::{Fields, Reader};
 use super::mesh::read_mesh;
 use super::mistakes::Mistakes;
-use super::transforms::{affine, read_transforms, transform};
+use super::transforms::transform;
 use crate::scene::{ObjectDesc, PrototypeDesc, Reference, SceneDesc, ShapeDesc};
 use camera::{camera, image};
 use light::{fog, light};
@@ -217,7 +218,7 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         desc.map(|shape| ObjectDesc { at, shape, material, transform, texture_transform })
     }
 
-    fn mesh_file(&mut self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<usize> {
+    pub(super) fn mesh_file(&mut self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<usize> {
         let name = fields.text(node, "mesh")?;
         let path = self.folder.join(name);
         // One file under two names is read once.
@@ -239,50 +240,5 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         };
         self.meshes.insert(key, index);
         index
-    }
-
-    fn instance(&mut self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<ShapeDesc> {
-        let name = fields.text(node, "instance")?;
-        let prototype = Reference { name: name.to_owned(), at: self.reader.locate(node.span) };
-        let transforms = match fields.get("transforms") {
-            None => vec![DAffine3::IDENTITY],
-            Some(node) => match &node.value {
-                Value::String(file) => {
-                    let path = self.folder.join(file);
-                    match read_transforms(&path) {
-                        Ok(transforms) => transforms,
-                        Err(error) => {
-                            self.reader.mistake(node.span, error.to_string());
-                            return None;
-                        }
-                    }
-                }
-                Value::Array(rows) => rows
-                    .iter()
-                    .map(|row| match &row.value {
-                        // Twelve numbers, or a list of steps as in `transform`.
-                        Value::Array(items)
-                            if items.iter().all(|i| matches!(i.value, Value::Table(_))) =>
-                        {
-                            transform(self.reader, row, "transforms")
-                        }
-                        Value::Array(items) if items.len() == 12 => {
-                            self.reader.numbers::<12>(row, "transforms").map(|m| affine(&m))
-                        }
-                        _ => {
-                            let expected = "a list of copies, each 12 numbers or a list of steps \
-                                such as [{ translate = [1, 0, 0] }]";
-                            self.reader.expected(row, "transforms", expected);
-                            None
-                        }
-                    })
-                    .collect::<Option<_>>()?,
-                _ => {
-                    self.reader.expected(node, "transforms", "a file name or a list");
-                    return None;
-                }
-            },
-        };
-        Some(ShapeDesc::Instances { prototype, transforms })
     }
 }

@@ -179,10 +179,11 @@ impl<'d, 'r> Interpreter<'d, 'r> {
 
     /// A polygon of `points` and `holes`.
     fn polygon(&self, fields: &Fields<'d, 'r>) -> Option<Polygon> {
-        let node = fields.require("points")?;
+        let (node, holes) = (fields.require("points"), fields.get("holes"));
+        let node = node?;
         let mut nodes = vec![node];
         let mut loops = vec![self.corners(node, "points")?];
-        if let Some(holes) = fields.get("holes") {
+        if let Some(holes) = holes {
             for hole in self.reader.list(holes, "holes") {
                 loops.push(self.corners(hole, "holes")?);
                 nodes.push(hole);
@@ -214,7 +215,7 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         Some(xyz.chunks_exact(3).map(DVec3::from_slice).collect())
     }
 
-    fn points(&self, node: &'d Node, name: &str) -> Option<Vec<f64>> {
+    pub(super) fn points(&self, node: &'d Node, name: &str) -> Option<Vec<f64>> {
         if !matches!(node.value, Value::Array(_)) {
             self.reader.expected(node, name, "a list of points");
             return None;
