@@ -196,7 +196,7 @@ impl Placer<'_> {
             };
             let has_uvs = match object.shape {
                 ShapeDesc::Mesh(mesh) => self.has_uvs[mesh],
-                ShapeDesc::Quadric(_) => false,
+                ShapeDesc::Quadric(_) | ShapeDesc::Implicit(_) => false,
                 _ => true,
             };
             if !has_uvs && self.maps[material as usize].needs_uv() {
