@@ -308,6 +308,7 @@ fn the_reference_has_every_field_and_no_other() {
         ),
         (vec![" `[render]`"], vec!["[render]\nzzz = 1".into()]),
         (vec![" `[ambient]`"], vec!["[ambient]\nzzz = 1".into()]),
+        (vec![" `[[objects]]`", " Implicit surface"], vec![object("shape = \"implicit\"")]),
         (vec![" `[[objects]]`", " Mesh in the scene file"], vec![object("shape = \"mesh\"")]),
         (vec![" `[[objects]]`", " Mesh from a file"], vec![object("mesh = \"a.ply\"")]),
         (vec![" `[[objects]]`", " Instance"], vec![object("instance = \"a\"")]),

@@ -57,7 +57,7 @@ f.toml:9:10: unknown filter `boxx` (did you mean `box`?); accepted: box, triangl
 f.toml:10:11: `epsilon` must be &quot;auto&quot; or a distance from 0 on, not the text &quot;small&quot;
 f.toml:11:1: a sphere lacks the field `radius`
 f.toml:13:1: unknown field `raduis` in a sphere (did you mean `radius`?); accepted: shape, center, radius, material, transform, texture_transform
-f.toml:15:9: unknown shape `spere` (did you mean `sphere`?); accepted: sphere, box, cylinder, cone, torus, disk, plane, quadric, polygon, triangle, mesh
+f.toml:15:9: unknown shape `spere` (did you mean `sphere`?); accepted: sphere, box, cylinder, cone, torus, disk, plane, quadric, implicit, polygon, triangle, mesh
 f.toml:17:1: [[lights]] lacks the field `intensity`
 "
         .replace("&quot;", "\"")
@@ -253,7 +253,7 @@ fn what_a_shape_cannot_be_is_told() {
             &format!(
                 "[materials.m]\ntype = \"diffuse\"\nreflectance = 0\nemission = 1\n[[objects]]\n{shape}\nmaterial = \"m\"\n"
             ),
-            "f.toml:5:1: this object cannot give off light; accepted with `emission`: meshes, and all shapes but `plane` and `quadric`",
+            "f.toml:5:1: this object cannot give off light; accepted with `emission`: meshes, and all shapes but `plane`, `quadric`, `implicit` and `isosurface`",
         );
     }
 }
@@ -292,4 +292,26 @@ fn mistakes_of_scatter_are_told() {
         assert!(found.ends_with(expected), "{found}");
         assert_eq!(found.lines().count(), 1, "{found}");
     }
+}
+
+#[test]
+fn expressions_are_told_at_the_character() {
+    let object = "[[objects]]\nshape = \"implicit\"\nbounds = [[-1, -1, -1], [1, 1, 1]]\n";
+    let told = "expected an operator (+ - * / ^) or the end, not `y`";
+    for (line, place) in [
+        ("expression = \"x + 2y\"", "4:20"),
+        ("expression = 'x + 2y'", "4:20"),
+        ("expression = \"\"\"x + \n  2y\"\"\"", "5:4"),
+        ("expression = '''\nx +\n  2y'''", "6:4"),
+        // With an escape, columns are not counted.
+        ("expression = \"x +\\n2y\"", "4:14"),
+    ] {
+        check(&format!("{object}{line}\n"), &format!("f.toml:{place}: in `expression`: {told}"));
+    }
+    check(
+        "[[objects]]\nshape = \"implicit\"\nexpression = \"x - rr\"\nbounds = [[1, 0, 0], [0, 1, 1]]\n",
+        "
+f.toml:3:19: in `expression`: unknown name `rr`; accepted: x, y, z, pi and the functions sqrt, cbrt, abs, exp, log, ln, sin, cos, tan, atan, min, max, pow
+f.toml:4:10: the second corner of `bounds` must be greater than the first along every axis; it is from [1, 0, 0] to [0, 1, 1]",
+    );
 }

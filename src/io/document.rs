@@ -195,6 +195,28 @@ impl Document {
         Ok(())
     }
 
+    /// Where the byte `at` of a text stands. In a text with escapes this is the place of the text.
+    pub(super) fn span_within(&self, node: &Node, at: usize) -> Span {
+        let Span { source, start } = node.span;
+        let found = || {
+            let Value::String(text) = &node.value else { return None };
+            let written = self.sources[source].text.as_ref()?.get(start..)?;
+            let quote = written.get(..1)?;
+            let triple = quote.repeat(3);
+            let opening = if written.starts_with(&triple) { triple.as_str() } else { quote };
+            let mut content = written.strip_prefix(opening)?;
+            // A line break that follows three quotes is no part of the text.
+            if opening.len() == 3 {
+                let rest = content.strip_prefix('\r').unwrap_or(content);
+                content = rest.strip_prefix('\n').unwrap_or(content);
+            }
+            content
+                .starts_with(text.get(..at)?)
+                .then_some(start + written.len() - content.len() + at)
+        };
+        Span { source, start: found().unwrap_or(start) }
+    }
+
     /// File, line and column of a place.
     pub(super) fn locate(&self, span: Span) -> Location {
         let source = &self.sources[span.source];

@@ -37,6 +37,11 @@ impl<'d> Reader<'d> {
         self.mistakes.borrow_mut().push((span, message.into()));
     }
 
+    /// A mistake at a byte of a text.
+    pub(super) fn mistake_within(&self, node: &Node, at: usize, message: String) {
+        self.mistake(self.document.span_within(node, at), message);
+    }
+
     pub(super) fn locate(&self, span: Span) -> Location {
         self.document.locate(span)
     }

@@ -196,7 +196,7 @@ pub enum SceneError {
     },
     /// A shape cannot be sampled as a light.
     #[error(
-        "{at}: this object cannot give off light; accepted with `emission`: meshes, and all shapes but `plane` and `quadric`"
+        "{at}: this object cannot give off light; accepted with `emission`: meshes, and all shapes but `plane`, `quadric`, `implicit` and `isosurface`"
     )]
     CannotGlow {
         /// The object; that of a copy is not known.

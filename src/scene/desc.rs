@@ -10,7 +10,7 @@ use crate::accel::{BuildQuality, Precision};
 use crate::camera::Projection;
 use crate::color::Rgb;
 use crate::film::Filter;
-use crate::geometry::{Polygon, Quadric, TriangleMesh};
+use crate::geometry::{Implicit, Polygon, Quadric, TriangleMesh};
 use crate::light::Falloff;
 use crate::material::Material;
 use crate::math::Bounds;
@@ -365,6 +365,8 @@ pub enum ShapeDesc {
     },
     /// A quadric.
     Quadric(Quadric),
+    /// A surface that an expression describes.
+    Implicit(Implicit),
     /// A flat polygon.
     Polygon(Polygon),
     /// Copies of a prototype, one a transform.

@@ -196,7 +196,7 @@ impl Placer<'_> {
             };
             let has_uvs = match object.shape {
                 ShapeDesc::Mesh(mesh) => self.has_uvs[mesh],
-                ShapeDesc::Quadric(_) => false,
+                ShapeDesc::Quadric(_) | ShapeDesc::Implicit(_) => false,
                 _ => true,
             };
             if !has_uvs && self.maps[material as usize].needs_uv() {
@@ -293,7 +293,7 @@ fn bits(look: &DraftLook) -> Option<[u64; 12]> {
 
 /// Whether points on a shape can be drawn at random, as light sources need.
 fn can_glow(shape: &ShapeDesc) -> bool {
-    !matches!(shape, ShapeDesc::Plane { .. } | ShapeDesc::Quadric(_))
+    !matches!(shape, ShapeDesc::Plane { .. } | ShapeDesc::Quadric(_) | ShapeDesc::Implicit(_))
 }
 
 fn check_transform(

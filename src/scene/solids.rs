@@ -58,6 +58,7 @@ impl Draft {
                 self.add(plane.transformed(m), look);
             }
             ShapeDesc::Quadric(quadric) => self.add(Framed::new(quadric, *m), look),
+            ShapeDesc::Implicit(ref shape) => self.add(Framed::new(shape.clone(), *m), look),
             ShapeDesc::Polygon(ref polygon) => self.add(polygon.transformed(m), look),
             ShapeDesc::Mesh(_) | ShapeDesc::Instances { .. } => {}
         }

@@ -1,11 +1,13 @@
 //! The shapes of `[[objects]]`.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::super::document::{Node, Value};
 use super::super::fields::Fields;
 use super::Interpreter;
-use crate::geometry::{NoPolygon, Polygon, Quadric, TriangleMesh};
+use crate::geometry::{Expression, Implicit, NoPolygon, Polygon, Quadric, TriangleMesh};
 use crate::scene::ShapeDesc;
 
 /// The values of `shape`.
@@ -19,13 +21,14 @@ pub(super) enum ShapeKind {
     Disk,
     Plane,
     Quadric,
+    Implicit,
     Polygon,
     Triangle,
     Mesh,
 }
 
 impl ShapeKind {
-    pub(super) const ALL: [(&'static str, Self); 11] = [
+    pub(super) const ALL: [(&'static str, Self); 12] = [
         ("sphere", Self::Sphere),
         ("box", Self::Box),
         ("cylinder", Self::Cylinder),
@@ -34,6 +37,7 @@ impl ShapeKind {
         ("disk", Self::Disk),
         ("plane", Self::Plane),
         ("quadric", Self::Quadric),
+        ("implicit", Self::Implicit),
         ("polygon", Self::Polygon),
         ("triangle", Self::Triangle),
         ("mesh", Self::Mesh),
@@ -118,6 +122,13 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 }
                 Some(ShapeDesc::Quadric(Quadric::new(coefficients, bounds?)))
             }
+            ShapeKind::Implicit => {
+                fields.is("an implicit surface");
+                let node = fields.require("expression");
+                let expression = node.and_then(|node| self.expression(fields, node));
+                let bounds = fields.require_bounds("bounds");
+                Some(ShapeDesc::Implicit(Implicit::new(expression?, bounds?)))
+            }
             ShapeKind::Polygon => {
                 fields.is("a polygon");
                 self.polygon(fields).map(ShapeDesc::Polygon)
@@ -141,6 +152,19 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 let triangles = self.triangles(triangles?, xyz.len() / 3)?;
                 self.scene.meshes.push(inline_mesh(&xyz, triangles));
                 Some(ShapeDesc::Mesh(self.scene.meshes.len() - 1))
+            }
+        }
+    }
+
+    /// An expression; a mistake in it is told at its character.
+    fn expression(&self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<Arc<Expression>> {
+        let text = fields.text(node, "expression")?;
+        match Expression::parse(text) {
+            Ok(expression) => Some(Arc::new(expression)),
+            Err(error) => {
+                let message = format!("in `expression`: {}", error.message);
+                self.reader.mistake_within(node, error.at, message);
+                None
             }
         }
     }
