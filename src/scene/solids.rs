@@ -59,7 +59,7 @@ impl Draft {
             }
             ShapeDesc::Quadric(quadric) => self.add(Framed::new(quadric, *m), look),
             ShapeDesc::Polygon(ref polygon) => self.add(polygon.transformed(m), look),
-            ShapeDesc::Mesh(_) | ShapeDesc::Instances { .. } => {}
+            ShapeDesc::Mesh(_) | ShapeDesc::Freeform(_) | ShapeDesc::Instances { .. } => {}
         }
     }
 }

@@ -144,7 +144,8 @@ impl BezierPatch {
         // The bound of a quotient is the tighter the less the weights differ: that of sixteen parts.
         let halves = |patch: &Self| {
             let [a, b] = patch.halves_along_u();
-            [a, b].map(|half| half.transposed().halves_along_u().map(|quarter| quarter.transposed()))
+            [a, b]
+                .map(|half| half.transposed().halves_along_u().map(|quarter| quarter.transposed()))
         };
         let parts = halves(self).into_iter().flatten();
         let parts = parts.flat_map(|part| halves(&part)).flatten();
@@ -166,9 +167,8 @@ impl BezierPatch {
         };
         let largest = |counts: [usize; 2], difference: &dyn Fn(usize, usize) -> DVec4| {
             let all = (0..counts[1]).flat_map(|j| (0..counts[0]).map(move |i| (i, j)));
-            all.map(|(i, j)| difference(i, j)).fold([0.0_f64; 2], |[a, w], d| {
-                [a.max(d.truncate().length()), w.max(d.w.abs())]
-            })
+            all.map(|(i, j)| difference(i, j))
+                .fold([0.0_f64; 2], |[a, w], d| [a.max(d.truncate().length()), w.max(d.w.abs())])
         };
         let u = |i, j| local(i + 1, j) - local(i, j);
         let v = |i, j| local(i, j + 1) - local(i, j);

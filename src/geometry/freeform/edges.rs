@@ -43,14 +43,20 @@ struct Edge {
 impl Edges {
     /// The edges of `patches`, each found once, and the four sides of each patch (see
     /// [`BezierPatch::edge`]). `counts` are the pieces that each patch asks for along u and v.
-    pub(super) fn new(patches: &[BezierPatch], counts: &[[u32; 2]], size: f64) -> (Self, Vec<[Side; 4]>) {
+    pub(super) fn new(
+        patches: &[BezierPatch],
+        counts: &[[u32; 2]],
+        size: f64,
+    ) -> (Self, Vec<[Side; 4]>) {
         let mut edges = Self::default();
         edges.corners.cell = 4.0 * SAME * size;
         let sides = patches
             .iter()
             .zip(counts)
             .map(|(patch, count)| {
-                std::array::from_fn(|side| edges.add(patch.edge(side), count[side % 2], SAME * size))
+                std::array::from_fn(|side| {
+                    edges.add(patch.edge(side), count[side % 2], SAME * size)
+                })
             })
             .collect();
         (edges, sides)

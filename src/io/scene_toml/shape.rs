@@ -22,10 +22,13 @@ pub(super) enum ShapeKind {
     Polygon,
     Triangle,
     Mesh,
+    Patches,
+    Nurbs,
+    Subdivision,
 }
 
 impl ShapeKind {
-    pub(super) const ALL: [(&'static str, Self); 11] = [
+    pub(super) const ALL: [(&'static str, Self); 14] = [
         ("sphere", Self::Sphere),
         ("box", Self::Box),
         ("cylinder", Self::Cylinder),
@@ -37,6 +40,9 @@ impl ShapeKind {
         ("polygon", Self::Polygon),
         ("triangle", Self::Triangle),
         ("mesh", Self::Mesh),
+        ("patches", Self::Patches),
+        ("nurbs", Self::Nurbs),
+        ("subdivision", Self::Subdivision),
     ];
 }
 
@@ -142,6 +148,18 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 self.scene.meshes.push(inline_mesh(&xyz, triangles));
                 Some(ShapeDesc::Mesh(self.scene.meshes.len() - 1))
             }
+            ShapeKind::Patches => {
+                fields.is("an object of patches");
+                self.patches(fields)
+            }
+            ShapeKind::Nurbs => {
+                fields.is("a NURBS surface");
+                self.nurbs(fields)
+            }
+            ShapeKind::Subdivision => {
+                fields.is("a subdivision surface");
+                self.subdivision(fields)
+            }
         }
     }
 
@@ -214,7 +232,7 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         Some(xyz.chunks_exact(3).map(DVec3::from_slice).collect())
     }
 
-    fn points(&self, node: &'d Node, name: &str) -> Option<Vec<f64>> {
+    pub(super) fn points(&self, node: &'d Node, name: &str) -> Option<Vec<f64>> {
         if !matches!(node.value, Value::Array(_)) {
             self.reader.expected(node, name, "a list of points");
             return None;

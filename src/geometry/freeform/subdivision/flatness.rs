@@ -1,9 +1,9 @@
 //! How far the limit surface may be from the triangles between limit points.
 //!
 //! About a regular face the surface is a bicubic B-spline, whose second derivatives are at most the
-//! largest second differences of its 16 control points: the bound of [`super::super::dice`]. Other faces
-//! (at extraordinary vertices, creases and boundaries) are refined a few levels further by themselves.
-//! There the distance of the new limit points is measured, and to it is added how thick the hull of the
+//! largest second differences of its 16 control points: the bound of [`super::super::dice`]. Where that is
+//! too much, as about extraordinary vertices, where parameters are uneven, and at creases and boundaries,
+//! a face is refined a few levels further by itself. There the distance of the new limit points is measured, and to it is added how thick the hull of the
 //! control points of each small face is across that face, within which the surface lies. Across is what
 //! counts: sideways the triangles of one face end where those of the next begin, but for creases and
 //! boundaries, which are bounded as curves.
@@ -15,22 +15,22 @@ use super::Polygons;
 use super::limit::{Limit, cut, quad};
 use super::refine::{Rule, Surroundings, Topology, refine};
 
-/// Levels that a face which is not regular is refined further.
+/// Levels that a face is refined further.
 const FURTHER: usize = 3;
 
-/// A bound of the distance between the surface and the triangles; only a lower one where it is more than
-/// `enough`.
-pub(super) fn deviation(mesh: &Polygons, topology: &Topology, limit: &Limit, enough: f64) -> f64 {
-    // What costs little first.
-    let faces = 0..mesh.face_count();
-    let regular = faces.clone().into_par_iter().map(|f| regular(mesh, limit, f));
-    let max = |a: f64, b: f64| a.max(b);
-    let worst = regular.map(|bound| bound.unwrap_or(0.0)).reduce(|| 0.0, max);
-    if worst > enough {
-        return worst;
-    }
-    let others = faces.into_par_iter().filter(|&f| self::regular(mesh, limit, f).is_none());
-    others.map(|f| further(mesh, topology, limit, f)).reduce(|| worst, max)
+/// Whether the surface is nowhere farther than `enough` from the triangles.
+pub(super) fn is_near(mesh: &Polygons, topology: &Topology, limit: &Limit, enough: f64) -> bool {
+    let is_far = |f: usize| {
+        let bound = regular(mesh, limit, f).unwrap_or(f64::INFINITY);
+        bound > enough && further(mesh, topology, limit, f) > enough
+    };
+    !(0..mesh.face_count()).into_par_iter().any(is_far)
+}
+
+/// A bound of the distance between the surface and the triangles.
+pub(super) fn deviation(mesh: &Polygons, topology: &Topology, limit: &Limit) -> f64 {
+    let bound = |f| further(mesh, topology, limit, f);
+    (0..mesh.face_count()).into_par_iter().map(bound).reduce(|| 0.0, f64::max)
 }
 
 /// The bound for a face whose surface is a bicubic B-spline; none for others.
@@ -65,7 +65,7 @@ fn regular(mesh: &Polygons, limit: &Limit, face: usize) -> Option<f64> {
     Some(0.125 * (along[0] + 2.0 * twist + along[1]))
 }
 
-/// The bound for any other face.
+/// A bound for any face.
 fn further(mesh: &Polygons, topology: &Topology, limit: &Limit, face: usize) -> f64 {
     let corners = std::array::from_fn(|k| limit.positions[mesh.face(face)[k] as usize]);
     let triangles = cut(&corners).map(|t| t.map(|k| corners[k]));
@@ -97,10 +97,8 @@ fn further(mesh: &Polygons, topology: &Topology, limit: &Limit, face: usize) -> 
             let nearest = triangles.iter().map(|t| distance(p, t)).fold(f64::INFINITY, f64::min);
             off = off.max(nearest);
         }
-        thickness = thickness.max(match regular(&part, &limit, f) {
-            Some(bound) => bound,
-            None => hull_thickness(&part, &limit, f),
-        });
+        let hull = hull_thickness(&part, &limit, f);
+        thickness = thickness.max(regular(&part, &limit, f).map_or(hull, |bound| bound.min(hull)));
     }
     off + thickness
 }

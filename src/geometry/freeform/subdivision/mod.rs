@@ -170,21 +170,20 @@ impl SubdivisionSurface {
     pub(super) fn facets(&self, tolerance: f64, limit: u64) -> Result<Facets, TooManyTriangles> {
         let too_many = |fits| TooManyTriangles { tolerance, limit, fits };
         let mut mesh = self.mesh.clone();
-        let mut last = f64::INFINITY;
         loop {
             let topology = Topology::new(&mesh);
             // Limit points are known of quadrilaterals alone; the first level makes them of anything.
             if mesh.faces().all(|face| face.len() == 4) {
-                let limit = limit::Limit::new(&mesh, &topology);
-                last = flatness::deviation(&mesh, &topology, &limit, tolerance);
-                if last <= tolerance {
-                    return Ok(limit.facets(&mesh));
+                let surface = limit::Limit::new(&mesh, &topology);
+                if flatness::is_near(&mesh, &topology, &surface, tolerance) {
+                    return Ok(surface.facets(&mesh));
                 }
-            }
-            // Each corner becomes a face.
-            if 2 * mesh.corners.len() as u64 > limit {
-                // A level takes a quarter of the distance, but only where the surface is smooth.
-                return Err(too_many(if last.is_finite() { 2.0 * last } else { f64::INFINITY }));
+                // Each corner becomes a face of two triangles.
+                if 2 * mesh.corners.len() as u64 > limit {
+                    return Err(too_many(flatness::deviation(&mesh, &topology, &surface)));
+                }
+            } else if 2 * mesh.corners.len() as u64 > limit {
+                return Err(too_many(f64::INFINITY));
             }
             mesh = refine(&mesh, &topology);
         }

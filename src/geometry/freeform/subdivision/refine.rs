@@ -166,7 +166,8 @@ pub(super) fn refine(mesh: &Polygons, topology: &Topology) -> Polygons {
         let [f, g] = edge.faces.map(|f| face_points[f as usize]);
         0.25 * (ends + f + g)
     });
-    let positions: Vec<DVec3> = moved.chain(edge_points).chain(face_points.iter().copied()).collect();
+    let positions: Vec<DVec3> =
+        moved.chain(edge_points).chain(face_points.iter().copied()).collect();
 
     let first_edge = mesh.positions.len() as u32;
     let first_face = first_edge + topology.edges.len() as u32;
