@@ -205,12 +205,12 @@ impl BezierPatch {
         let (mut low, mut high) = (self.clone(), self.clone());
         let rows = low.control.chunks_exact_mut(n).zip(high.control.chunks_exact_mut(n));
         for (low, high) in rows {
-            for k in 1..n {
-                // What has been halved k times: the first is of the lower half, the last of the upper.
+            // What has been halved k times: the first is of the lower half, the last of the upper.
+            for (k, low) in low.iter_mut().enumerate().skip(1) {
                 for i in 0..n - k {
                     high[i] = 0.5 * (high[i] + high[i + 1]);
                 }
-                low[k] = high[0];
+                *low = high[0];
             }
         }
         [low, high]

@@ -40,6 +40,9 @@ pub(super) fn tolerance(fields: &Fields<'_, '_>) -> Option<Tolerance> {
     parsed
 }
 
+/// Points, faces, and the node that says where they are.
+type ControlMesh<'d> = (Vec<DVec3>, Vec<Vec<u32>>, &'d Node);
+
 impl<'d, 'r> Interpreter<'d, 'r> {
     /// Bézier patches from a file, from points, or from points by number.
     pub(super) fn patches(&self, fields: &Fields<'d, 'r>) -> Option<ShapeDesc> {
@@ -174,11 +177,7 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         Some(ShapeDesc::Freeform(Arc::new(FreeformDesc { surface, tolerance })))
     }
 
-    fn control_file(
-        &self,
-        fields: &Fields<'d, 'r>,
-        node: &'d Node,
-    ) -> Option<(Vec<DVec3>, Vec<Vec<u32>>, &'d Node)> {
+    fn control_file(&self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<ControlMesh<'d>> {
         let path = self.folder.join(fields.text(node, "file")?);
         let polygons = read_polygons(&path);
         let polygons = polygons.map_err(|e| self.reader.mistake(node.span, e.to_string())).ok()?;

@@ -194,8 +194,9 @@ fn normal(mesh: &Polygons, v: u32, rule: Rule, sector: &Sector) -> DVec3 {
             let theta = PI / k;
             let r = (theta.cos() + 1.0) / theta.sin();
             let mut inwards = -r * (1.0 + 2.0 * theta.cos()) * (first + last);
-            for i in 1..edges.len() - 1 {
-                inwards += 4.0 * (i as f64 * theta).sin() * edges[i];
+            // The first and the last have a sine of 0.
+            for (i, edge) in edges.iter().enumerate().take(faces.len()) {
+                inwards += 4.0 * (i as f64 * theta).sin() * *edge;
             }
             for (i, face) in faces.iter().enumerate() {
                 let i = i as f64;
