@@ -418,7 +418,7 @@ fn turned(profile: &[(DVec2, f64)], knots: Vec<f64>, center: DVec3) -> NurbsSurf
 
 fn sphere(radius: f64, center: DVec3) -> NurbsSurface {
     let half = [[0, -1], [1, -1], [1, 0], [1, 1], [0, 1]];
-    let weight = |i: usize| if i % 2 == 0 { 1.0 } else { FRAC_1_SQRT_2 };
+    let weight = |i: usize| if i.is_multiple_of(2) { 1.0 } else { FRAC_1_SQRT_2 };
     let half = half.map(|[x, y]| DVec2::new(f64::from(x), f64::from(y)) * radius);
     let profile: Vec<_> = half.into_iter().enumerate().map(|(i, p)| (p, weight(i))).collect();
     turned(&profile, vec![0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 1.0], center)
