@@ -20,9 +20,10 @@ use glam::DVec3;
 const SCENE: &str = include_str!("../docs/scene.md");
 
 /// The pages of the reference.
-const REFERENCE: [(&str, &str); 4] = [
+const REFERENCE: [(&str, &str); 5] = [
     ("docs/scene.md", SCENE),
     ("docs/shapes.md", include_str!("../docs/shapes.md")),
+    ("docs/freeform.md", include_str!("../docs/freeform.md")),
     ("docs/materials.md", include_str!("../docs/materials.md")),
     ("docs/lights.md", include_str!("../docs/lights.md")),
 ];
@@ -88,6 +89,10 @@ fn content(name: &str) -> Option<Cow<'static, [u8]>> {
         "stl" => {
             "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
              endloop\nendfacet\nendsolid\n"
+        }
+        "bpt" => {
+            let points = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n".repeat(4);
+            return Some(format!("1\n3 3\n{points}").into_bytes().into());
         }
         "csv" => {
             "# x, y, z and translation\n1,0,0,0, 0,1,0,0, 0,0,1,0\n\n1,0,0,3, 0,1,0,0, 0,0,1,0\n"
@@ -309,6 +314,18 @@ fn the_reference_has_every_field_and_no_other() {
         (vec![" `[render]`"], vec!["[render]\nzzz = 1".into()]),
         (vec![" `[ambient]`"], vec!["[ambient]\nzzz = 1".into()]),
         (vec![" `[[objects]]`", " Implicit surface"], vec![object("shape = \"implicit\"")]),
+        (
+            vec![" `[[objects]]`", " Patches"],
+            vec![object("shape = \"patches\"\npoints = [[0, 0, 0]]")],
+        ),
+        (vec![" `[[objects]]`", " NURBS"], vec![object("shape = \"nurbs\"")]),
+        (
+            vec![" `[[objects]]`", " Subdivision"],
+            vec![
+                object("shape = \"subdivision\""),
+                object("shape = \"subdivision\"\nfile = \"a.obj\""),
+            ],
+        ),
         (vec![" `[[objects]]`", " Mesh in the scene file"], vec![object("shape = \"mesh\"")]),
         (vec![" `[[objects]]`", " Mesh from a file"], vec![object("mesh = \"a.ply\"")]),
         (vec![" `[[objects]]`", " Instance"], vec![object("instance = \"a\"")]),
@@ -571,6 +588,7 @@ fn the_reference_has_the_defaults() {
         (" `[render]`", "filter", choice(settings.filter.name())),
         (" `[render]`", "precision", choice(settings.precision.name())),
         (" `[render]`", "build_quality", choice(settings.build_quality.name())),
+        (" `[render]`", "tolerance", "0.5".into()),
         (" `[render]`", "epsilon", choice("auto")),
     ] {
         let section = section(heading);

@@ -59,6 +59,17 @@ fn facts(scene: &Scene, hash: u64) -> Vec<(&'static str, String)> {
     ];
     geometry.extend(r.shapes.iter().map(|&([one, many], n)| counted(n, one, many)));
     fact("geometry", joined(&geometry));
+    for (name, made) in
+        std::iter::once("freeform").chain(std::iter::repeat("")).zip(&scene.tessellations)
+    {
+        let [one, many] = made.kind;
+        fact(
+            name,
+            joined(&[counted(made.patches as u64, one, many)])
+                + &format!(" became {} triangles, ", grouped(made.triangles as u64))
+                + &format!("at most {} ({:.1e} m) off", made.tolerance, made.distance),
+        );
+    }
     if r.copies > 0 {
         let prototypes = counted(r.prototypes, "prototype", "prototypes").unwrap_or_default();
         let copies = counted(r.copies, "copy", "copies").unwrap_or_default();

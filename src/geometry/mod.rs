@@ -5,6 +5,7 @@ mod cone;
 mod cuboid;
 mod disk;
 mod framed;
+pub mod freeform;
 mod implicit;
 mod mesh;
 mod plane;

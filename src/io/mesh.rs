@@ -47,11 +47,41 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile, ReadError> {
     }
 }
 
+/// A mesh whose faces are polygons.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PolygonFile {
+    /// The vertices.
+    pub positions: Vec<DVec3>,
+    /// Vertices of all faces, one face after the other.
+    pub corners: Vec<u32>,
+    /// Corners of each face, 3 or more.
+    pub face_sizes: Vec<u32>,
+}
+
+/// Reads the faces of an `.obj` file whole, with the vertices as they are numbered there. Normals and
+/// texture coordinates are passed over.
+///
+/// # Errors
+/// As [`read_mesh`], and where a coordinate cannot be used.
+pub(super) fn read_polygons(path: &Path) -> Result<PolygonFile, ReadError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    if extension != "obj" {
+        return Err(ReadError::file(path, "faces of any number of corners are read from: .obj"));
+    }
+    let polygons = obj::read_polygons(path)?;
+    let is_usable = |p: &DVec3| p.abs().cmple(DVec3::splat(MAX_COORDINATE)).all();
+    if let Some(vertex) = polygons.positions.iter().position(|p| !is_usable(p)) {
+        let message = format!("vertex {} has a coordinate that is not within 1e18", vertex + 1);
+        return Err(ReadError::file(path, message));
+    }
+    Ok(polygons)
+}
+
 /// Most vertices, and most triangles, that a mesh may have: ids are u32 and the last is taken.
 const MAX_COUNT: u64 = u32::MAX as u64 - 1;
 
 /// Largest coordinate that is taken for one; beyond it, squared distances overflow an f32.
-const MAX_COORDINATE: f64 = 1e18;
+pub(super) const MAX_COORDINATE: f64 = 1e18;
 
 /// Checks a number of `what` ("vertices", "triangles") against what ids can name.
 pub(super) fn check_count(path: &Path, n: u64, what: &str) -> Result<(), ReadError> {

@@ -8,6 +8,7 @@
 //! Numbers from files are suspects: nothing is allocated in proportion to a number that a file merely
 //! claims. A file that is written appears whole under its name, or not at all.
 
+mod bpt;
 mod distinct;
 mod document;
 mod error;

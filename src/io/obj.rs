@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use self::lines::{Line, Lines, Words};
 use super::error::ReadError;
-use super::mesh::{MeshFile, Tally, check_count};
+use super::mesh::{MeshFile, PolygonFile, Tally, check_count};
 use super::source::Source;
 use super::text::{parse_integer, parse_number, quoted};
 
@@ -49,6 +49,17 @@ pub(super) fn read(path: &Path) -> Result<MeshFile, ReadError> {
     let parsed = parse(path, &bytes, PIECE)?;
     drop(bytes);
     assemble::mesh(path, parsed)
+}
+
+/// Reads the faces of an OBJ file as they are; see [`super::mesh::read_polygons`].
+pub(super) fn read_polygons(path: &Path) -> Result<PolygonFile, ReadError> {
+    let bytes = lines::normalize(Source::open(path)?.read_from(0)?);
+    let Parsed { v, corners, face_sizes, .. } = parse(path, &bytes, PIECE)?;
+    if face_sizes.is_empty() {
+        return Err(ReadError::file(path, "no faces"));
+    }
+    let positions = v.as_chunks::<3>().0.iter().map(|&p| p.into()).collect();
+    Ok(PolygonFile { positions, corners, face_sizes })
 }
 
 /// How many of each there are.

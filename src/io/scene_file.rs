@@ -9,6 +9,7 @@ use super::document::Document;
 use super::error::ReadError;
 use super::mistakes::Mistakes;
 use super::scene_toml::{Interpreted, interpret};
+use crate::geometry::freeform::FreeformSurface;
 use crate::scene::{SceneDesc, ShapeDesc};
 
 /// What the command line adds to a scene file.
@@ -97,6 +98,9 @@ fn hash(scene: &SceneDesc, text: &str, options: &LoadOptions) -> u64 {
                 total.update(bytemuck::cast_slice(&transform.to_cols_array()));
             }
         }
+        if let ShapeDesc::Freeform(freeform) = &object.shape {
+            hash_surface(&freeform.surface, &mut total);
+        }
     }
     // Pictures, in the order of the materials that name them; the text says the rest.
     for image in scene.materials.iter().flat_map(|m| m.maps.images()) {
@@ -117,4 +121,25 @@ fn hash(scene: &SceneDesc, text: &str, options: &LoadOptions) -> u64 {
         add(bytemuck::cast_slice(&mesh.origin.to_array()));
     }
     total.digest()
+}
+
+/// Adds the control points and faces of a surface; the text says the rest.
+fn hash_surface(surface: &FreeformSurface, total: &mut Xxh3) {
+    total.update(&(surface.len() as u64).to_le_bytes());
+    match surface {
+        FreeformSurface::Patches(patches) => {
+            for point in patches.iter().flat_map(|patch| patch.control()) {
+                total.update(bytemuck::cast_slice(&point.to_array()));
+            }
+        }
+        FreeformSurface::Subdivision(surface) => {
+            for point in surface.positions() {
+                total.update(bytemuck::cast_slice(&point.to_array()));
+            }
+            for face in surface.faces() {
+                total.update(&(face.len() as u64).to_le_bytes());
+                total.update(bytemuck::cast_slice(face));
+            }
+        }
+    }
 }

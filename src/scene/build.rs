@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3};
 
 use super::desc::{
     CameraDesc, LensDesc, Location, MaterialDesc, PlaceDesc, Reference, RenderSettings, SceneDesc,
+    Tolerance,
 };
 use super::draft::{GeometryLooks, Look};
 use super::lights::{
@@ -16,6 +17,7 @@ use super::maps::Maps;
 use super::place::{Placed, place};
 use super::requirements::{Contents, Requirements};
 use super::surface::SurfacePoint;
+use super::tessellate::{Tessellation, tessellate};
 use crate::accel::{Accel, AccelError, AccelKind, BuildOptions, Hit, World};
 use crate::camera::{Camera, Lens, Pose, Projection};
 use crate::color::Rgb;
@@ -50,6 +52,8 @@ pub struct Scene {
     pub settings: RenderSettings,
     /// What it requires of a renderer.
     pub requirements: Requirements,
+    /// What became of freeform surfaces.
+    pub tessellations: Vec<Tessellation>,
     /// What was subtracted from the coordinates of the files, in f64.
     pub center: DVec3,
     /// The box around everything.
@@ -212,6 +216,20 @@ pub enum SceneError {
         /// The material.
         material: String,
     },
+    /// A tolerance asks for more triangles than there may be.
+    #[error(
+        "{at}: with a tolerance of {tolerance} this object takes more than {limit} triangles; {fits} would fit"
+    )]
+    TooManyTriangles {
+        /// The object.
+        at: Location,
+        /// Its tolerance.
+        tolerance: Tolerance,
+        /// How many there may be.
+        limit: u64,
+        /// A tolerance that does not take more.
+        fits: Tolerance,
+    },
     /// The acceleration structure could not be built.
     #[error(transparent)]
     Accel(#[from] AccelError),
@@ -302,6 +320,12 @@ impl Scene {
             .into_iter()
             .chain(desc.materials.iter().map(|m| !m.emission.is_black()))
             .collect();
+        let default_projection = Projection::Perspective { fov: DEFAULT_FOV.to_radians() };
+        let tessellations = tessellate(&mut desc, &prototype_names, pose, default_projection)
+            .unwrap_or_else(|more| {
+                errors.extend(more);
+                Vec::new()
+            });
         let placed = place(&mut desc, &material_names, &prototype_names, &maps, &glows);
         let placed = match placed {
             Ok(placed) if errors.is_empty() => placed,
@@ -325,7 +349,6 @@ impl Scene {
         let bounds = world.bounds();
         let size = desc.image.size;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
-        let default_projection = Projection::Perspective { fov: DEFAULT_FOV.to_radians() };
         let mut projection = desc.camera.as_ref().map_or(default_projection, |c| c.projection);
         let pose = match pose {
             Some(pose) => pose.translated(-center),
@@ -396,6 +419,7 @@ impl Scene {
             camera_interior: Interior::OUTSIDE,
             settings: desc.settings,
             requirements,
+            tessellations,
             center,
             bounds,
             accel,

@@ -10,6 +10,7 @@ use crate::accel::{BuildQuality, Precision};
 use crate::camera::Projection;
 use crate::color::Rgb;
 use crate::film::Filter;
+use crate::geometry::freeform::FreeformSurface;
 use crate::geometry::{Implicit, Polygon, Quadric, TriangleMesh};
 use crate::light::Falloff;
 use crate::material::Material;
@@ -167,6 +168,8 @@ pub struct RenderSettings {
     pub epsilon: Epsilon,
     /// Work put into the hierarchy.
     pub build_quality: BuildQuality,
+    /// How far triangles may be from the freeform surfaces that they stand for.
+    pub tolerance: Tolerance,
 }
 
 impl Default for RenderSettings {
@@ -186,7 +189,40 @@ impl Default for RenderSettings {
             filter: Filter::default(),
             epsilon: Epsilon::Auto,
             build_quality: BuildQuality::default(),
+            tolerance: Tolerance::Pixels(0.5),
         }
+    }
+}
+
+/// How far triangles may be from the surface that they stand for; above 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Tolerance {
+    /// In pixels, where the surface is nearest to the camera.
+    Pixels(f64),
+    /// In metres of the world.
+    Meters(f64),
+}
+
+impl Tolerance {
+    /// Another one, that many times as large.
+    pub fn times(self, factor: f64) -> Self {
+        match self {
+            Self::Pixels(count) => Self::Pixels(count * factor),
+            Self::Meters(meters) => Self::Meters(meters * factor),
+        }
+    }
+}
+
+impl fmt::Display for Tolerance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (number, unit) = match *self {
+            Self::Pixels(count) => (count, "px"),
+            Self::Meters(meters) => (meters, "m"),
+        };
+        if (1e-3..1e6).contains(&number) {
+            return write!(f, "{} {unit}", (number * 1e4).round() / 1e4);
+        }
+        write!(f, "{number:.1e} {unit}")
     }
 }
 
@@ -369,6 +405,8 @@ pub enum ShapeDesc {
     Implicit(Implicit),
     /// A flat polygon.
     Polygon(Polygon),
+    /// A freeform surface, which becomes a mesh once it is known from where it is seen.
+    Freeform(Arc<FreeformDesc>),
     /// Copies of a prototype, one a transform.
     Instances {
         /// Which prototype.
@@ -376,6 +414,15 @@ pub enum ShapeDesc {
         /// World from prototype.
         transforms: Vec<DAffine3>,
     },
+}
+
+/// A freeform surface and how near its triangles shall be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeformDesc {
+    /// The surface.
+    pub surface: FreeformSurface,
+    /// Where not given, that of [`RenderSettings`].
+    pub tolerance: Option<Tolerance>,
 }
 
 /// Objects that are only copied.

@@ -16,14 +16,17 @@ mod requirements;
 mod scatter;
 mod solids;
 mod surface;
+mod tessellate;
 
 pub use build::{Scene, SceneError, UnknownName};
 pub use desc::{
-    CameraDesc, Epsilon, ImageDesc, IntegratorKind, LensDesc, LightDesc, Location, MaterialDesc,
-    ObjectDesc, PlaceDesc, PrototypeDesc, Reference, RenderSettings, SceneDesc, Shadows, ShapeDesc,
+    CameraDesc, Epsilon, FreeformDesc, ImageDesc, IntegratorKind, LensDesc, LightDesc, Location,
+    MaterialDesc, ObjectDesc, PlaceDesc, PrototypeDesc, Reference, RenderSettings, SceneDesc,
+    Shadows, ShapeDesc, Tolerance,
 };
 pub use maps::{Cone, Maps};
 pub use media::Crossing;
 pub use requirements::{Requirements, Variant};
 pub use scatter::{Scatter, Turn};
 pub use surface::SurfacePoint;
+pub use tessellate::Tessellation;

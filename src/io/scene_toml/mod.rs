@@ -1,6 +1,7 @@
 //! Our own scene format: tables become a [`SceneDesc`]. The format is described in `docs/scene.md`.
 
 mod camera;
+mod freeform;
 mod instance;
 mod light;
 mod material;

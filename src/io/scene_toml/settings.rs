@@ -1,5 +1,6 @@
 //! `[render]`.
 
+use super::freeform::tolerance;
 use crate::accel::{BuildQuality, Precision};
 use crate::color::{VISIBLE_MAX, VISIBLE_MIN};
 use crate::film::Filter;
@@ -48,6 +49,7 @@ pub(super) fn settings(reader: &Reader<'_>, fields: Fields<'_, '_>) -> RenderSet
         build_quality: fields
             .choice("build_quality", &BuildQuality::ALL.map(|q| (q.name(), q)))
             .unwrap_or(default.build_quality),
+        tolerance: tolerance(&fields).unwrap_or(default.tolerance),
     };
     fields.finish();
     settings

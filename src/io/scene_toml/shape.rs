@@ -25,10 +25,13 @@ pub(super) enum ShapeKind {
     Polygon,
     Triangle,
     Mesh,
+    Patches,
+    Nurbs,
+    Subdivision,
 }
 
 impl ShapeKind {
-    pub(super) const ALL: [(&'static str, Self); 12] = [
+    pub(super) const ALL: [(&'static str, Self); 15] = [
         ("sphere", Self::Sphere),
         ("box", Self::Box),
         ("cylinder", Self::Cylinder),
@@ -41,6 +44,9 @@ impl ShapeKind {
         ("polygon", Self::Polygon),
         ("triangle", Self::Triangle),
         ("mesh", Self::Mesh),
+        ("patches", Self::Patches),
+        ("nurbs", Self::Nurbs),
+        ("subdivision", Self::Subdivision),
     ];
 }
 
@@ -152,6 +158,18 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 let triangles = self.triangles(triangles?, xyz.len() / 3)?;
                 self.scene.meshes.push(inline_mesh(&xyz, triangles));
                 Some(ShapeDesc::Mesh(self.scene.meshes.len() - 1))
+            }
+            ShapeKind::Patches => {
+                fields.is("an object of patches");
+                self.patches(fields)
+            }
+            ShapeKind::Nurbs => {
+                fields.is("a NURBS surface");
+                self.nurbs(fields)
+            }
+            ShapeKind::Subdivision => {
+                fields.is("a subdivision surface");
+                self.subdivision(fields)
             }
         }
     }
