@@ -5,6 +5,7 @@ mod cone;
 mod cuboid;
 mod disk;
 mod framed;
+pub mod grid;
 mod mesh;
 mod plane;
 mod polygon;
