@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::{AnalyticShape, Cone, Cuboid, Disk, Framed, Plane, Polygon, Quadric, Sphere, Torus};
+use super::{
+    AnalyticShape, Cone, Cuboid, Disk, Framed, Isosurface, Plane, Polygon, Quadric, Sphere, Torus,
+};
 use crate::math::Bounds;
 
 /// A shape that is placed in a group, in a list of its kind.
@@ -103,6 +105,8 @@ shape_kinds! {
     Planes(Plane) ["plane", "planes"], |p, by| p.point += by;
     /// Quadrics.
     Quadrics(Framed<Quadric>) ["quadric", "quadrics"], moved;
+    /// Isosurfaces of grids.
+    Isosurfaces(Framed<Isosurface>) ["isosurface", "isosurfaces"], moved;
     /// Flat polygons.
     Polygons(Polygon) ["polygon", "polygons"], |p, by| {
         *p = p.transformed(&DAffine3::from_translation(by));

@@ -14,7 +14,7 @@ use super::source::{CHUNK, Source};
 use crate::geometry::grid::{Grid, SampleOrder};
 
 /// The type of a file's samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SampleType {
     /// Unsigned bytes.
     U8,
@@ -83,7 +83,7 @@ impl SampleType {
 }
 
 /// How samples lie in a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SampleLayout {
     /// Samples along x, y and z.
     pub size: [usize; 3],

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat4, DVec3};
 
 use super::maps::Maps;
+use super::volumes::VolumeDesc;
 use crate::accel::{BuildQuality, Precision};
 use crate::camera::Projection;
 use crate::color::Rgb;
 use crate::film::Filter;
-use crate::geometry::{Polygon, Quadric, TriangleMesh};
+use crate::geometry::{Isosurface, Polygon, Quadric, TriangleMesh};
 use crate::light::Falloff;
 use crate::material::Material;
 use crate::math::Bounds;
@@ -80,6 +81,8 @@ pub struct SceneDesc {
     pub lights: Vec<LightDesc>,
     /// Fog around everything, with heights in world coordinates.
     pub fog: Option<Fog>,
+    /// Grids that glow and absorb.
+    pub volumes: Vec<VolumeDesc>,
 }
 
 /// The picture.
@@ -365,6 +368,8 @@ pub enum ShapeDesc {
     },
     /// A quadric.
     Quadric(Quadric),
+    /// An isosurface of a grid.
+    Isosurface(Isosurface),
     /// A flat polygon.
     Polygon(Polygon),
     /// Copies of a prototype, one a transform.

@@ -16,6 +16,7 @@ mod requirements;
 mod scatter;
 mod solids;
 mod surface;
+mod volumes;
 
 pub use build::{Scene, SceneError, UnknownName};
 pub use desc::{
@@ -27,3 +28,4 @@ pub use media::Crossing;
 pub use requirements::{Requirements, Variant};
 pub use scatter::{Scatter, Turn};
 pub use surface::SurfacePoint;
+pub use volumes::VolumeDesc;

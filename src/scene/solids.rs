@@ -58,6 +58,9 @@ impl Draft {
                 self.add(plane.transformed(m), look);
             }
             ShapeDesc::Quadric(quadric) => self.add(Framed::new(quadric, *m), look),
+            ShapeDesc::Isosurface(ref surface) => {
+                self.add(Framed::new(surface.clone(), *m), look);
+            }
             ShapeDesc::Polygon(ref polygon) => self.add(polygon.transformed(m), look),
             ShapeDesc::Mesh(_) | ShapeDesc::Instances { .. } => {}
         }

@@ -52,7 +52,7 @@ impl Range {
 }
 
 /// In which order samples follow one another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SampleOrder {
     /// x runs fastest, z slowest.
     XFastest,

@@ -19,13 +19,14 @@ pub(super) enum ShapeKind {
     Disk,
     Plane,
     Quadric,
+    Isosurface,
     Polygon,
     Triangle,
     Mesh,
 }
 
 impl ShapeKind {
-    pub(super) const ALL: [(&'static str, Self); 11] = [
+    pub(super) const ALL: [(&'static str, Self); 12] = [
         ("sphere", Self::Sphere),
         ("box", Self::Box),
         ("cylinder", Self::Cylinder),
@@ -34,6 +35,7 @@ impl ShapeKind {
         ("disk", Self::Disk),
         ("plane", Self::Plane),
         ("quadric", Self::Quadric),
+        ("isosurface", Self::Isosurface),
         ("polygon", Self::Polygon),
         ("triangle", Self::Triangle),
         ("mesh", Self::Mesh),
@@ -117,6 +119,10 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                     return None;
                 }
                 Some(ShapeDesc::Quadric(Quadric::new(coefficients, bounds?)))
+            }
+            ShapeKind::Isosurface => {
+                fields.is("an isosurface");
+                self.isosurface(fields).map(ShapeDesc::Isosurface)
             }
             ShapeKind::Polygon => {
                 fields.is("a polygon");
