@@ -13,10 +13,10 @@ use glam::DVec3;
 /// Samples along each axis.
 const N: usize = 64;
 
-/// |ψ|² of the state (3, 2, 0), relative to its greatest value, over a box of 30 Bohr radii; its axis is
+/// |ψ|² of the state (3, 2, 0), relative to its greatest value, over a box of 40 Bohr radii; its axis is
 /// +Y: ψ ∝ r²·exp(−r/3)·(3 cos²θ − 1).
 fn orbital(p: DVec3) -> f64 {
-    let p = 15.0 * p;
+    let p = 20.0 * p;
     let r = p.length();
     let psi = (-r / 3.0).exp() * (3.0 * p.y * p.y - r * r);
     // On the axis r is 6 where it is greatest.
@@ -42,12 +42,12 @@ fn noise(p: DVec3) -> f64 {
     sum
 }
 
-/// A ball whose rim is frayed by four octaves of noise; 0 outside.
+/// A ball that four octaves of noise fray; 0 at the faces of the box.
 fn smoke(p: DVec3) -> f64 {
-    let octave = |i: i32| noise(3.0 * 2f64.powi(i) * (p + 7.3)) * 0.5f64.powi(i);
+    let octave = |i: i32| noise(2.5 * 2f64.powi(i) * (p + 7.3)) * 0.5f64.powi(i);
     let turbulence: f64 = (0..4).map(octave).sum::<f64>() / 1.875;
-    let body = 1.0 - p.length() / 0.95;
-    (2.4 * (body + 0.9 * (turbulence - 0.5)) * body.clamp(0.0, 0.25) / 0.25).clamp(0.0, 1.0)
+    let body = 1.0 - p.length();
+    (3.0 * (body + 2.2 * (turbulence - 0.5)) * (4.0 * body).clamp(0.0, 1.0)).clamp(0.0, 1.0)
 }
 
 /// A `.npy` file of version 1: the array's axes are x, y and z, in C order.

@@ -167,8 +167,11 @@ proptest! {
             prop_assert!(surface.occluded(o, d, 0.0, first));
             // Beginning elsewhere in a cell may move a root by its rounding, or meet it again.
             let eps = near.max(1e-7) / d.length();
-            let rest = surface.intersect(o, d, first, f64::INFINITY).map(|hit| hit.t);
-            let rest = rest.filter(|t| t - first > eps);
+            let mut rest = None;
+            surface.crossings(o, d, first, f64::INFINITY, |t| {
+                rest = (t - first > eps).then_some(t);
+                rest.is_none()
+            });
             let next = found.iter().copied().find(|t| t - first > eps);
             match (rest, next) {
                 (Some(a), Some(b)) => prop_assert!((a - b).abs() <= eps * 10.0, "{} {}", a, b),
