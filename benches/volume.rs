@@ -16,6 +16,9 @@ use alhazen::medium::volume::{
 };
 use glam::{DAffine3, DVec3};
 
+/// A value for each point of space.
+type Field = fn(DVec3) -> f64;
+
 const SIZE: usize = 256;
 const BOX: Bounds = Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE };
 
@@ -54,7 +57,7 @@ fn noise(p: DVec3) -> f64 {
 fn main() {
     let rays = rays(512);
     println!("{SIZE}³ samples, {} parallel rays, one thread", rays.len());
-    let fields: [(&str, f64, fn(DVec3) -> f64); 3] = [
+    let fields: [(&str, f64, Field); 3] = [
         ("sphere", 0.0, |p| 0.9 - p.length()),
         ("gyroid", 0.0, gyroid),
         ("noise, level 0.9", 0.9, noise),

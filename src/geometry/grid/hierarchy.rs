@@ -71,7 +71,7 @@ impl Hierarchy {
 
 /// Bricks along an axis of `n` cells.
 fn bricks(n: usize, shift: u32) -> usize {
-    (n - 1 >> shift) + 1
+    ((n - 1) >> shift) + 1
 }
 
 impl Level {

@@ -41,7 +41,6 @@ pub(super) struct Pieces<'v, E> {
 
 impl<'v> Pieces<'v, ()> {
     /// The way of a ray from its origin to `t_max`.
-    #[expect(clippy::new_ret_no_self, reason = "what skips bricks is a closure")]
     pub(super) fn new(
         volume: &'v Volume,
         origin: DVec3,
