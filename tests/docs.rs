@@ -20,10 +20,11 @@ use glam::DVec3;
 const SCENE: &str = include_str!("../docs/scene.md");
 
 /// The pages of the reference.
-const REFERENCE: [(&str, &str); 5] = [
+const REFERENCE: [(&str, &str); 6] = [
     ("docs/scene.md", SCENE),
     ("docs/shapes.md", include_str!("../docs/shapes.md")),
     ("docs/freeform.md", include_str!("../docs/freeform.md")),
+    ("docs/grids.md", include_str!("../docs/grids.md")),
     ("docs/materials.md", include_str!("../docs/materials.md")),
     ("docs/lights.md", include_str!("../docs/lights.md")),
 ];
@@ -79,6 +80,9 @@ fn content(name: &str) -> Option<Cow<'static, [u8]>> {
     let (_, extension) = name.rsplit_once('.')?;
     let text = match extension {
         "png" => return Some(picture().into()),
+        "npy" => return Some(array().into()),
+        // Of the one that is described.
+        "raw" => return Some(vec![0; 64 * 32 * 16].into()),
         "ply" => {
             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
              property float z\nproperty float u\nproperty float v\nelement face 1\n\
@@ -100,6 +104,16 @@ fn content(name: &str) -> Option<Cow<'static, [u8]>> {
         _ => return None,
     };
     Some(text.as_bytes().into())
+}
+
+/// A `.npy` file of one cell.
+fn array() -> Vec<u8> {
+    let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (2, 2, 2), }\n";
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend([0; 8]);
+    bytes
 }
 
 /// A PNG of one pixel.
@@ -338,6 +352,15 @@ fn the_reference_has_every_field_and_no_other() {
                 })
                 .to_vec(),
         ),
+        (
+            vec![" `[[objects]]`", " Isosurface", " Grid files"],
+            vec![object("shape = \"isosurface\"\ngrid = \"a.raw\"")],
+        ),
+        (
+            vec![" `[[volumes]]`", " Grid files"],
+            vec!["[[volumes]]\ngrid = \"a.raw\"\nzzz = 1".into()],
+        ),
+        (vec![" Transfer functions"], vec!["[[volumes]]\ntransfer = [{ zzz = 1 }]".into()]),
         (vec![" Transforms"], vec!["[camera]\ntransform = [{ zzz = 1 }]".into()]),
         (vec![" `[prototypes.NAME]`"], vec!["[prototypes.a]\nzzz = 1".into()]),
         (vec![" Colour ramps"], vec![texture("noise = [{ zzz = 1 }]", "seed = 1")]),
@@ -417,6 +440,9 @@ fn the_reference_has_every_choice() {
         (" `[[lights]]`", "[[lights]]\ntype = \"zzz\"".into()),
         (" `point`", "[[lights]]\ntype = \"point\"\nfalloff = \"zzz\"".into()),
         (" `[medium]`", "[medium]\ntype = \"zzz\"".into()),
+        (" Isosurface", "[[objects]]\nshape = \"isosurface\"\nnormals = \"zzz\"".into()),
+        (" Grid files", "[[volumes]]\ngrid = \"a.raw\"\nformat = \"zzz\"".into()),
+        (" Grid files", "[[volumes]]\ngrid = \"a.raw\"\nbyte_order = \"zzz\"".into()),
     ] {
         let section = section(heading);
         for choice in accepted(&scene) {
@@ -510,6 +536,37 @@ fn the_defaults_are_those_of_the_program() {
             "[[lights]]",
             lines(&["type = \"sphere\"", "center = [0, 0, 0]", "radius = 1", "radiance = 1"]),
         ),
+        (
+            " Isosurface",
+            "[[objects]]",
+            lines(&[
+                "shape = \"isosurface\"",
+                "grid = \"a.npy\"",
+                "bounds = [[0, 0, 0], [1, 1, 1]]",
+                "level = 1",
+            ]),
+        ),
+        (
+            " Grid files",
+            "[[objects]]",
+            lines(&[
+                "grid = \"a.raw\"",
+                "size = [64, 32, 16]",
+                "format = \"u8\"",
+                "shape = \"isosurface\"",
+                "bounds = [[0, 0, 0], [1, 1, 1]]",
+                "level = 1",
+            ]),
+        ),
+        (
+            " `[[volumes]]`",
+            "[[volumes]]",
+            lines(&[
+                "grid = \"a.npy\"",
+                "bounds = [[0, 0, 0], [1, 1, 1]]",
+                "transfer = [{ value = 0, extinction = 1 }]",
+            ]),
+        ),
         (" `fog`", "[medium]", lines(&["type = \"fog\"", "scattering = 1"])),
         (
             " `height-fog`",
@@ -531,6 +588,11 @@ fn the_defaults_are_those_of_the_program() {
         check_defaults(heading, &one(kind), |f| within("diffuse", "reflectance", f));
     }
     check_defaults(" Fresnel", &[], |f| within("mirror", "fresnel", f));
+    let node = ["value = 1".to_owned(), "extinction = 1".to_owned()];
+    check_defaults(" Transfer functions", &node, |f| {
+        let rest = "grid = \"a.npy\"\nbounds = [[0, 0, 0], [1, 1, 1]]";
+        format!("[[volumes]]\n{rest}\ntransfer = [{{ {} }}]", f.join(", "))
+    });
     check_defaults(" Bumps", &one("noise = [0, 1]"), |f| within("diffuse", "bump", f));
     if reads_images() {
         let image = one("image = \"a.png\"");

@@ -10,6 +10,7 @@ fn mistakes(text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("f.toml");
     std::fs::write(&path, text).unwrap();
+    std::fs::write(folder.path().join("eight.raw"), [0; 8]).unwrap();
     let message = match load_scene(&path, &LoadOptions::default()) {
         Err(error) => error.to_string(),
         Ok(loaded) => match Scene::build_quietly(loaded.scene, AccelKind::Brute) {
@@ -57,7 +58,7 @@ f.toml:9:10: unknown filter `boxx` (did you mean `box`?); accepted: box, triangl
 f.toml:10:11: `epsilon` must be &quot;auto&quot; or a distance from 0 on, not the text &quot;small&quot;
 f.toml:11:1: a sphere lacks the field `radius`
 f.toml:13:1: unknown field `raduis` in a sphere (did you mean `radius`?); accepted: shape, center, radius, material, transform, texture_transform
-f.toml:15:9: unknown shape `spere` (did you mean `sphere`?); accepted: sphere, box, cylinder, cone, torus, disk, plane, quadric, implicit, polygon, triangle, mesh
+f.toml:15:9: unknown shape `spere` (did you mean `sphere`?); accepted: sphere, box, cylinder, cone, torus, disk, plane, quadric, implicit, isosurface, polygon, triangle, mesh, patches, nurbs, subdivision
 f.toml:17:1: [[lights]] lacks the field `intensity`
 "
         .replace("&quot;", "\"")
@@ -76,7 +77,7 @@ fn unknown_tables_and_names() {
     check(
         "[imege]\nsize = [1, 1]\n[[objects]]\nshape = 3\n",
         "
-f.toml:1:2: unknown field `imege` in the scene (did you mean `image`?); accepted: image, render, ambient, medium, camera, cameras, materials, lights, prototypes, objects
+f.toml:1:2: unknown field `imege` in the scene (did you mean `image`?); accepted: image, render, ambient, medium, camera, cameras, materials, lights, volumes, prototypes, objects
 f.toml:4:9: `shape` must be text, not the number 3",
     );
     check(
@@ -313,5 +314,49 @@ fn expressions_are_told_at_the_character() {
         "
 f.toml:3:19: in `expression`: unknown name `rr`; accepted: x, y, z, pi and the functions sqrt, cbrt, abs, exp, log, ln, sin, cos, tan, atan, min, max, pow
 f.toml:4:10: the second corner of `bounds` must be greater than the first along every axis; it is from [1, 0, 0] to [0, 1, 1]",
+    );
+}
+
+/// Grids: what is in the file, and what is said of it.
+#[test]
+fn each_mistake_of_a_grid_is_told() {
+    let bounds = "bounds = [[0, 0, 0], [1, 1, 1]]";
+    let volume = |rest: &str| format!("[[volumes]]\n{bounds}\n{rest}\n");
+    let raw = "grid = \"eight.raw\"\nsize = [2, 2, 2]\nformat = \"u8\"\n";
+    for (rest, expected) in [
+        (
+            "grid = \"a.vdb\"\ntransfer = []",
+            "f.toml:3:8: `grid` must be the name of a .npy or .raw file\nf.toml:4:12: a transfer function needs at least one node",
+        ),
+        (
+            "grid = \"eight.raw\"\nsize = [2, 1, 4]\nformat = \"f16\"",
+            "f.toml:1:1: [[volumes]] lacks the field `transfer`\nf.toml:4:8: `size` must be three whole numbers from 2 on: samples along x, y and z\nf.toml:5:10: unknown format `f16` (did you mean `u16`?); accepted: u8, i8, u16, i16, u32, i32, f32, f64",
+        ),
+        (
+            "grid = \"eight.raw\"\nsize = [2, 2, 3]\nformat = \"u8\"\ntransfer = [{ value = 0, extinction = 1 }]",
+            "f.toml:3:8: eight.raw: 2 x 2 x 3 samples of 1 bytes are 12 bytes, but the file holds 8",
+        ),
+        (
+            &format!(
+                "{raw}transfer = [{{ value = 1, extinction = 1 }}, {{ value = 0, extinction = 1 }}]"
+            ),
+            "f.toml:6:12: the values of a transfer function must ascend: 0 follows 1",
+        ),
+        (
+            &format!("{raw}transfer = [{{ value = 1, extinction = -1 }}]\ntolerance = 0"),
+            "f.toml:6:39: `extinction` must not be below 0, as -1 is\nf.toml:7:13: `tolerance` must be above 0, not 0",
+        ),
+        (
+            &format!(
+                "{raw}transfer = [{{ value = 1, extinction = 1 }}]\ntransform = [{{ scale = [1, 0, 1] }}]"
+            ),
+            "f.toml:1:1: the transform of this object is singular: it flattens the object to a plane, a line or a point",
+        ),
+    ] {
+        check(&volume(rest), expected);
+    }
+    check(
+        "[[objects]]\nshape = \"isosurface\"\ngrid = \"f.toml.npy\"\nbounds = [[0, 0, 0], [1, 0, 1]]\nlevel = \"high\"",
+        "f.toml:3:8: f.toml.npy: cannot open: No such file or directory (os error 2)\nf.toml:4:10: the second corner of `bounds` must be greater than the first along every axis; it is from [0, 0, 0] to [1, 0, 1]\nf.toml:5:9: `level` must be a finite number (within 1e30), not the text \"high\"",
     );
 }

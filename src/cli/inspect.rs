@@ -158,6 +158,7 @@ fn requirements(scene: &Scene) -> Vec<String> {
     );
     need(is_lit && r.glows, "light of surfaces that are seen, as some glow");
     need(is_lit && r.fog, "transmittances of fog, as there is a `[medium]`");
+    need(is_lit && r.volumes > 0, "integrals along rays, as there are `[[volumes]]`");
     need(r.lens, "points on a lens drawn at random, as the camera has one");
     need(!r.shapes.is_empty(), "user geometry, as there are shapes that are no triangles");
     need(r.copies > 0, "a second level, as there are instances");

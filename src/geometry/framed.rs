@@ -76,6 +76,12 @@ impl<S: AnalyticShape> AnalyticShape for Framed<S> {
         }
     }
 
+    #[inline]
+    fn shading_normal(&self, p: DVec3, part: u8) -> Option<DVec3> {
+        let inner = self.shape.shading_normal(self.inner_from_outer.transform_point3(p), part)?;
+        Some((self.inner_from_outer.matrix3.transpose() * inner).normalize_or_zero())
+    }
+
     fn parameters(&self, p: DVec3, part: u8) -> Parameters {
         let inner = self.shape.parameters(self.inner_from_outer.transform_point3(p), part);
         let m = &self.outer_from_inner.matrix3;

@@ -79,6 +79,12 @@ pub trait AnalyticShape: Clone + Debug + Send + Sync + 'static {
     /// The point of the surface near `p`, on the part that was hit.
     fn surface_at(&self, p: DVec3, part: u8) -> ShapePoint;
 
+    /// The unit normal that the surface is shaded by there, pointing out, where that is another.
+    #[inline]
+    fn shading_normal(&self, _p: DVec3, _part: u8) -> Option<DVec3> {
+        None
+    }
+
     /// The texture coordinates there.
     fn parameters(&self, p: DVec3, part: u8) -> Parameters;
 

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::{
-    AnalyticShape, Cone, Cuboid, Disk, Framed, Implicit, Plane, Polygon, Quadric, Sphere, Torus,
+    AnalyticShape, Cone, Cuboid, Disk, Framed, Implicit, Isosurface, Plane, Polygon, Quadric,
+    Sphere, Torus,
 };
 use crate::math::Bounds;
 
@@ -107,6 +108,8 @@ shape_kinds! {
     Quadrics(Framed<Quadric>) ["quadric", "quadrics"], moved;
     /// Implicit surfaces.
     Implicits(Framed<Implicit>) ["implicit surface", "implicit surfaces"], moved;
+    /// Isosurfaces of grids.
+    Isosurfaces(Framed<Isosurface>) ["isosurface", "isosurfaces"], moved;
     /// Flat polygons.
     Polygons(Polygon) ["polygon", "polygons"], |p, by| {
         *p = p.transformed(&DAffine3::from_translation(by));

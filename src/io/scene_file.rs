@@ -1,6 +1,8 @@
 //! Loading whatever a user names as a scene: our TOML, or a bare mesh.
 
+use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
@@ -10,7 +12,7 @@ use super::error::ReadError;
 use super::mistakes::Mistakes;
 use super::scene_toml::{Interpreted, interpret};
 use crate::geometry::freeform::FreeformSurface;
-use crate::scene::{SceneDesc, ShapeDesc};
+use crate::scene::{ObjectDesc, SceneDesc, ShapeDesc};
 
 /// What the command line adds to a scene file.
 #[derive(Debug, Clone, Default)]
@@ -107,6 +109,24 @@ fn hash(scene: &SceneDesc, text: &str, options: &LoadOptions) -> u64 {
         let picture = &image.levels()[0];
         total.update(bytemuck::cast_slice(&picture.size()));
         total.update(picture.pixels().as_bytes());
+    }
+    // Grids; objects in their order, then volumes.
+    let surfaces = scene.prototypes.iter().flat_map(|p| &p.objects).chain(&scene.objects);
+    let of_surface = |object: &ObjectDesc| match &object.shape {
+        ShapeDesc::Isosurface(surface) => Some(surface.grid().clone()),
+        _ => None,
+    };
+    let mut known = HashMap::new();
+    for grid in surfaces.filter_map(of_surface).chain(scene.volumes.iter().map(|v| v.grid.clone()))
+    {
+        // Once, however often it is used.
+        let hash = *known.entry(Arc::as_ptr(&grid)).or_insert_with(|| {
+            let samples: &[u8] = bytemuck::cast_slice(grid.samples());
+            let parts: Vec<u64> = samples.par_chunks(PART).map(xxh3_64).collect();
+            xxh3_64(bytemuck::cast_slice(&parts))
+        });
+        total.update(bytemuck::cast_slice(&grid.size().map(|n| n as u64)));
+        total.update(&hash.to_le_bytes());
     }
     for mesh in &scene.meshes {
         let mut add = |bytes: &[u8]| {

@@ -18,12 +18,14 @@ use super::place::{Placed, place};
 use super::requirements::{Contents, Requirements};
 use super::surface::SurfacePoint;
 use super::tessellate::{Tessellation, tessellate};
+use super::volumes::{check_volumes, placed_volumes};
 use crate::accel::{Accel, AccelError, AccelKind, BuildOptions, Hit, World};
 use crate::camera::{Camera, Lens, Pose, Projection};
 use crate::color::Rgb;
 use crate::light::{Light, LightTree};
 use crate::material::Material;
 use crate::math::Bounds;
+use crate::medium::volume::Volume;
 use crate::medium::{Fog, FogProfile, Interior};
 
 /// Vertical field of view where none is given.
@@ -46,6 +48,8 @@ pub struct Scene {
     pub light_tree: Option<LightTree>,
     /// Fog around everything.
     pub fog: Option<Fog>,
+    /// Grids that glow and absorb.
+    pub volumes: Vec<Volume>,
     /// The media that the camera stands in.
     pub camera_interior: Interior,
     /// How to render.
@@ -316,6 +320,7 @@ impl Scene {
         let mut maps = vec![Maps::default()];
         maps.extend(desc.materials.iter().map(|material| material.maps.clone()));
         errors.extend(check_materials(&desc));
+        errors.extend(check_volumes(&desc.volumes));
         let glows: Vec<bool> = [false]
             .into_iter()
             .chain(desc.materials.iter().map(|m| !m.emission.is_black()))
@@ -346,14 +351,20 @@ impl Scene {
             !desc.lights.is_empty() || desc.ambient.is_some() || !glowing.is_empty();
         let Placed { world, root_looks, prototype_looks, frames, center } = placed;
 
-        let bounds = world.bounds();
+        let volumes = placed_volumes(&desc.volumes, center);
+        let bounds = volumes.iter().map(Volume::bounds).fold(world.bounds(), Bounds::union);
         let size = desc.image.size;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let mut projection = desc.camera.as_ref().map_or(default_projection, |c| c.projection);
         let pose = match pose {
             Some(pose) => pose.translated(-center),
             None => {
-                let support = |directions| world.support(directions);
+                let support = |directions: [DVec3; 4]| {
+                    let corners = volumes.iter().flat_map(Volume::corners);
+                    corners.fold(world.support(directions), |reach, p| {
+                        std::array::from_fn(|i| reach[i].max(directions[i].dot(p)))
+                    })
+                };
                 let (pose, height) =
                     Camera::frame(support, DVec3::new(-0.6, -0.45, -1.0), projection, aspect);
                 if let Projection::Orthographic { height: h @ 0.0 } = &mut projection {
@@ -397,6 +408,7 @@ impl Scene {
             picks_lights: light_tree.is_some(),
             glows: !emissions.is_empty(),
             fog: fog.is_some(),
+            volumes: volumes.len(),
             lens: lens.is_some(),
             settings: &desc.settings,
             lit_automatically: !has_own_light,
@@ -416,6 +428,7 @@ impl Scene {
             lights,
             light_tree,
             fog,
+            volumes,
             camera_interior: Interior::OUTSIDE,
             settings: desc.settings,
             requirements,

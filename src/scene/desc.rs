@@ -6,12 +6,13 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat4, DVec3};
 
 use super::maps::Maps;
+use super::volumes::VolumeDesc;
 use crate::accel::{BuildQuality, Precision};
 use crate::camera::Projection;
 use crate::color::Rgb;
 use crate::film::Filter;
 use crate::geometry::freeform::FreeformSurface;
-use crate::geometry::{Implicit, Polygon, Quadric, TriangleMesh};
+use crate::geometry::{Implicit, Isosurface, Polygon, Quadric, TriangleMesh};
 use crate::light::Falloff;
 use crate::material::Material;
 use crate::math::Bounds;
@@ -81,6 +82,8 @@ pub struct SceneDesc {
     pub lights: Vec<LightDesc>,
     /// Fog around everything, with heights in world coordinates.
     pub fog: Option<Fog>,
+    /// Grids that glow and absorb.
+    pub volumes: Vec<VolumeDesc>,
 }
 
 /// The picture.
@@ -403,6 +406,8 @@ pub enum ShapeDesc {
     Quadric(Quadric),
     /// A surface that an expression describes.
     Implicit(Implicit),
+    /// An isosurface of a grid.
+    Isosurface(Isosurface),
     /// A flat polygon.
     Polygon(Polygon),
     /// A freeform surface, which becomes a mesh once it is known from where it is seen.

@@ -17,6 +17,7 @@ mod scatter;
 mod solids;
 mod surface;
 mod tessellate;
+mod volumes;
 
 pub use build::{Scene, SceneError, UnknownName};
 pub use desc::{
@@ -30,3 +31,4 @@ pub use requirements::{Requirements, Variant};
 pub use scatter::{Scatter, Turn};
 pub use surface::SurfacePoint;
 pub use tessellate::Tessellation;
+pub use volumes::VolumeDesc;

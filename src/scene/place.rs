@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::build::{NameIndex, SceneError};
-use super::desc::{ObjectDesc, SceneDesc, ShapeDesc};
+use super::desc::{Location, ObjectDesc, SceneDesc, ShapeDesc};
 use super::draft::{Draft, DraftLook, GeometryLooks};
 use super::maps::Maps;
 use crate::accel::{InstanceSet, World, rows_from_affine};
@@ -122,6 +122,9 @@ pub(super) fn place(
     lift_planes(&mut root, &mut drafts, &copies);
     let bounds: Vec<Bounds> = drafts.iter().map(|d| d.bounds(&mesh_bounds)).collect();
     let mut world_bounds = root.bounds(&mesh_bounds);
+    for volume in &desc.volumes {
+        world_bounds = world_bounds.union(volume.bounds());
+    }
     for (b, transforms) in bounds.iter().zip(&copies) {
         world_bounds = transforms.iter().fold(world_bounds, |w, m| w.union(b.transformed(m)));
     }
@@ -181,8 +184,8 @@ impl Placer<'_> {
                 },
             };
             let m = object.transform;
-            let checked = check_transform(&m, "transform", &object).and_then(|()| {
-                check_transform(&object.texture_transform, "texture_transform", &object)
+            let checked = check_transform(&m, "transform", &object.at).and_then(|()| {
+                check_transform(&object.texture_transform, "texture_transform", &object.at)
             });
             if let Err(error) = checked {
                 self.errors.push(error);
@@ -196,7 +199,7 @@ impl Placer<'_> {
             };
             let has_uvs = match object.shape {
                 ShapeDesc::Mesh(mesh) => self.has_uvs[mesh],
-                ShapeDesc::Quadric(_) | ShapeDesc::Implicit(_) => false,
+                ShapeDesc::Quadric(_) | ShapeDesc::Implicit(_) | ShapeDesc::Isosurface(_) => false,
                 _ => true,
             };
             if !has_uvs && self.maps[material as usize].needs_uv() {
@@ -296,16 +299,16 @@ fn can_glow(shape: &ShapeDesc) -> bool {
     !matches!(shape, ShapeDesc::Plane { .. } | ShapeDesc::Quadric(_) | ShapeDesc::Implicit(_))
 }
 
-fn check_transform(
+pub(super) fn check_transform(
     m: &DAffine3,
     what: &'static str,
-    object: &ObjectDesc,
+    at: &Location,
 ) -> Result<(), SceneError> {
     if !m.is_finite() {
-        return Err(SceneError::TransformNotFinite { at: object.at.clone(), what });
+        return Err(SceneError::TransformNotFinite { at: at.clone(), what });
     }
     if is_singular(&m.matrix3) {
-        return Err(SceneError::TransformSingular { at: object.at.clone(), what });
+        return Err(SceneError::TransformSingular { at: at.clone(), what });
     }
     Ok(())
 }

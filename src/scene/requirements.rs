@@ -14,7 +14,7 @@ pub enum Variant {
     Local,
     /// And mirrors and glass.
     Tree,
-    /// And textures, area lights, many lights, glowing surfaces, fog, light through glass, dispersion.
+    /// And textures, area lights, many lights, glowing surfaces, fog, volumes, light through glass, dispersion.
     Everything,
 }
 
@@ -73,6 +73,8 @@ pub struct Requirements {
     pub glows: bool,
     /// Whether there is fog.
     pub fog: bool,
+    /// Grids that glow and absorb.
+    pub volumes: u64,
     /// Whether the camera has a lens.
     pub lens: bool,
     /// Whether the scene has no light of its own and is lit from the camera's side.
@@ -94,6 +96,7 @@ pub(super) struct Contents<'a> {
     pub(super) picks_lights: bool,
     pub(super) glows: bool,
     pub(super) fog: bool,
+    pub(super) volumes: usize,
     pub(super) lens: bool,
     pub(super) settings: &'a RenderSettings,
     pub(super) lit_automatically: bool,
@@ -106,6 +109,7 @@ impl Requirements {
             picks_lights: contents.picks_lights,
             glows: contents.glows,
             fog: contents.fog,
+            volumes: contents.volumes as u64,
             lens: contents.lens,
             lit_automatically: contents.lit_automatically,
             ..Self::default()
@@ -181,6 +185,7 @@ impl Requirements {
             || self.picks_lights
             || self.glows
             || self.fog
+            || self.volumes > 0
             || self.transparent_shadows
             || (is_tree && self.dispersive > 0)
         {

@@ -59,6 +59,9 @@ impl Draft {
             }
             ShapeDesc::Quadric(quadric) => self.add(Framed::new(quadric, *m), look),
             ShapeDesc::Implicit(ref shape) => self.add(Framed::new(shape.clone(), *m), look),
+            ShapeDesc::Isosurface(ref surface) => {
+                self.add(Framed::new(surface.clone(), *m), look);
+            }
             ShapeDesc::Polygon(ref polygon) => self.add(polygon.transformed(m), look),
             ShapeDesc::Mesh(_) | ShapeDesc::Freeform(_) | ShapeDesc::Instances { .. } => {}
         }

@@ -169,12 +169,13 @@ fn on_shape(
     transform: Option<&Transform3x4>,
 ) -> Local {
     let point = shape.surface_at(point_along(ray, hit.t, transform), hit.part());
-    let (position, normal) = (point.position.as_vec3(), point.normal.as_vec3());
+    let position = point.position.as_vec3();
+    let normal = shape.shading_normal(point.position, hit.part()).unwrap_or(point.normal);
     Local {
         position,
         error: gamma(2) * position.abs().max_element(),
-        geometric_normal: normal,
-        normal,
+        geometric_normal: point.normal.as_vec3(),
+        normal: normal.as_vec3(),
     }
 }
 

@@ -108,6 +108,10 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             {
                 light *= fog.transmittance(&ray, sample.distance);
             }
+            if F::EVERYTHING && !scene.volumes.is_empty() && scene.settings.shadows.are_cast() {
+                // Also where a packet says what is occluded.
+                shadow_rays[lane] = ray;
+            }
             unshadowed[lane] = light;
             waiting |= 1 << lane;
             match &mut packet {
@@ -128,10 +132,11 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             let to = node(lane).lane as usize;
             if packet.is_some() || !casts_shadows {
                 if occluded >> lane & 1 == 0 {
-                    self.radiance[to] += unshadowed[lane];
+                    self.radiance[to] += unshadowed[lane] * self.passes_volumes(&shadow_rays[lane]);
                 }
             } else if let Some(transmittance) = self.arrives(&shadow_rays[lane], &node(lane)) {
-                self.radiance[to] += unshadowed[lane] * transmittance;
+                self.radiance[to] +=
+                    unshadowed[lane] * transmittance * self.passes_volumes(&shadow_rays[lane]);
             }
         }
     }

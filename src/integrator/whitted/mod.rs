@@ -14,6 +14,7 @@
 mod light;
 mod scatter;
 mod shadow;
+mod volume;
 
 use std::marker::PhantomData;
 
@@ -332,6 +333,9 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     #[inline]
     fn through_media(&mut self, node: &Node, distance: f32) -> Rgb {
         let mut throughput = node.throughput;
+        if F::EVERYTHING && !self.scene.volumes.is_empty() {
+            return self.through_volumes(node, distance);
+        }
         if F::TREE && !node.interior.is_outside() {
             if let Some(medium) = self.scene.medium(node.interior)
                 && !medium.absorption.is_black()

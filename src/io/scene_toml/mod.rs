@@ -8,17 +8,21 @@ mod material;
 mod settings;
 mod shape;
 mod texture;
+mod volume;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DAffine3;
 
 use super::document::{Document, Node};
 use super::fields::{Fields, Reader};
+use super::grid::SampleLayout;
 use super::mesh::read_mesh;
 use super::mistakes::Mistakes;
 use super::transforms::transform;
+use crate::geometry::grid::Grid;
 use crate::scene::{ObjectDesc, PrototypeDesc, Reference, SceneDesc, ShapeDesc};
 use camera::{camera, image};
 use light::{fog, light};
@@ -47,6 +51,7 @@ pub(super) fn interpret(
         scene: SceneDesc::default(),
         warnings: Vec::new(),
         meshes: HashMap::new(),
+        grids: HashMap::new(),
     };
     scene.root(camera);
     let Interpreter { scene, warnings, .. } = scene;
@@ -61,6 +66,8 @@ struct Interpreter<'d, 'r> {
     warnings: Vec<String>,
     /// Mesh files by path: read once, however often they are named.
     meshes: HashMap<PathBuf, Option<usize>>,
+    /// Grids by path, and by layout where the file does not tell it.
+    grids: HashMap<(PathBuf, Option<SampleLayout>), Option<Arc<Grid>>>,
 }
 
 impl<'d, 'r> Interpreter<'d, 'r> {
@@ -100,6 +107,14 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 }
             }
         }
+        if let Some(node) = root.get("volumes") {
+            for node in self.reader.list(node, "volumes") {
+                if let Some(fields) = self.reader.table(node, "[[volumes]]") {
+                    let volume = self.volume(fields);
+                    self.scene.volumes.extend(volume);
+                }
+            }
+        }
         if let Some(fields) = self.table(&root, "prototypes", "[prototypes]") {
             for (name, node) in fields.all() {
                 let what = format!("[prototypes.{name}]");
@@ -113,7 +128,7 @@ impl<'d, 'r> Interpreter<'d, 'r> {
         }
         if let Some(node) = root.get("objects") {
             self.scene.objects = self.objects(node);
-        } else {
+        } else if !root.has("volumes") {
             self.warnings.push("the scene has no objects".to_owned());
         }
         root.finish();

@@ -22,6 +22,7 @@ pub(super) enum ShapeKind {
     Plane,
     Quadric,
     Implicit,
+    Isosurface,
     Polygon,
     Triangle,
     Mesh,
@@ -31,7 +32,7 @@ pub(super) enum ShapeKind {
 }
 
 impl ShapeKind {
-    pub(super) const ALL: [(&'static str, Self); 15] = [
+    pub(super) const ALL: [(&'static str, Self); 16] = [
         ("sphere", Self::Sphere),
         ("box", Self::Box),
         ("cylinder", Self::Cylinder),
@@ -41,6 +42,7 @@ impl ShapeKind {
         ("plane", Self::Plane),
         ("quadric", Self::Quadric),
         ("implicit", Self::Implicit),
+        ("isosurface", Self::Isosurface),
         ("polygon", Self::Polygon),
         ("triangle", Self::Triangle),
         ("mesh", Self::Mesh),
@@ -134,6 +136,10 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 let expression = node.and_then(|node| self.expression(fields, node));
                 let bounds = fields.require_bounds("bounds");
                 Some(ShapeDesc::Implicit(Implicit::new(expression?, bounds?)))
+            }
+            ShapeKind::Isosurface => {
+                fields.is("an isosurface");
+                self.isosurface(fields).map(ShapeDesc::Isosurface)
             }
             ShapeKind::Polygon => {
                 fields.is("a polygon");
