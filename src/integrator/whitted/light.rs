@@ -77,7 +77,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         sample: impl Fn(usize) -> Option<LightSample>,
     ) {
         let scene = self.scene;
-        let in_packets = N == LANES && is_coherent && !self.sees_through();
+        let in_packets = N == LANES && is_coherent && !self.is_tinted();
         let mut packet = in_packets.then(RayBlock::empty);
         let mut shadow_rays = [const { Ray::new(glam::Vec3::ZERO, glam::Vec3::ZERO) }; N];
         let mut unshadowed = [Rgb::BLACK; N];
@@ -118,7 +118,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         let mut occluded = 0;
         if casts_shadows && let Some(packet) = &packet {
             self.counts.shadow += u64::from(waiting.count_ones());
-            occluded = self.query.occluded_block(packet);
+            occluded = self.blocked(packet);
         }
         for lane in (0..N).filter(|lane| waiting >> lane & 1 == 1) {
             let to = nodes[lane].lane as usize;
