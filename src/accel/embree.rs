@@ -383,8 +383,9 @@ fn outer_bounds(shape: &impl AnalyticShape) -> UserBounds {
 /// Shapes of one kind as Embree's callbacks see them: solved in f64.
 struct Shapes<S>(Arc<Vec<S>>);
 
+// Always inlined: Embree's callback is nothing but this, and is called two or three times a ray.
 impl<S: AnalyticShape> UserGeometry for Shapes<S> {
-    #[inline]
+    #[inline(always)]
     fn intersect(&self, primitive: u32, ray: &embree::Ray) -> Option<UserHit> {
         let shape = self.0.get(primitive as usize)?;
         let (origin, direction, t_min, t_max) = widened(ray);
@@ -392,7 +393,7 @@ impl<S: AnalyticShape> UserGeometry for Shapes<S> {
         Some(UserHit { t: hit.t as f32, u: Hit::u_of_part(hit.part), v: 0.0 })
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, primitive: u32, ray: &embree::Ray) -> bool {
         let Some(shape) = self.0.get(primitive as usize) else { return false };
         let (origin, direction, t_min, t_max) = widened(ray);
