@@ -31,7 +31,7 @@ use scatter::Way;
 pub trait Features: Send + Sync + 'static {
     /// Mirrored and refracted rays.
     const TREE: bool;
-    /// Textures, area lights, many lights, glowing surfaces, fog, light through glass, dispersion.
+    /// Textures, area lights, many lights, glowing surfaces, fog, light dimmed by glass, dispersion.
     const EVERYTHING: bool;
     /// What is kept of up to `N` hits for textures: nothing where there are none.
     type Textured<const N: usize>: TexturedHits;
@@ -129,6 +129,9 @@ impl<F> Whitted<F> {
     }
 }
 
+/// Rays that wait, for which there is room at the start: two of each lane of a block.
+const STACK: usize = 2 * LANES;
+
 /// A ray of the tree.
 #[derive(Debug, Clone, Copy)]
 struct Node {
@@ -146,9 +149,9 @@ struct Node {
     /// Bounces before it.
     depth: u32,
     /// Surfaces between equal media that it has passed straight.
-    passed: u32,
+    passed: u16,
     /// Which pixel of the block it belongs to.
-    lane: u32,
+    lane: u8,
     /// How it left its parent.
     way: Way,
     /// What of its way lies before its origin, where it did not begin there.
@@ -215,7 +218,7 @@ impl<F: Features> Integrator for Whitted<F> {
             max_depth: self.max_depth,
             camera,
             counts,
-            stack: Vec::new(),
+            stack: Vec::with_capacity(STACK),
             blocks: Vec::new(),
             radiance: [Rgb::BLACK; LANES],
             features: PhantomData,
@@ -231,7 +234,7 @@ impl<F: Features> Integrator for Whitted<F> {
                 wavelength: 0.0,
                 depth: 0,
                 passed: 0,
-                lane: lane as u32,
+                lane: lane as u8,
                 way: Way::Refracted,
                 before: if F::EVERYTHING { way_before(scene, &ray) } else { 0.0 },
             }
@@ -256,7 +259,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         loop {
             while let Some(node) = self.stack.pop() {
                 let hit = self.query.intersect(&node.ray);
-                self.shade(1, &[node], |_| hit.as_ref());
+                self.shade(1, std::array::from_ref(&node), |_| hit.as_ref());
             }
             let Some(block) = self.blocks.pop() else { return };
             self.shade(block.active, &block.nodes, |lane| block.hits.get(lane));
@@ -325,8 +328,8 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     fn through_media(&mut self, node: &Node, distance: f32) -> Rgb {
         let mut throughput = node.throughput;
         if F::TREE && !node.interior.is_outside() {
-            if let Some(medium) = self.scene.medium(node.interior)
-                && !medium.absorption.is_black()
+            if self.scene.requirements.absorbing > 0
+                && let Some(medium) = self.scene.medium(node.interior)
             {
                 throughput *= beer_lambert(medium.absorption, distance);
             }

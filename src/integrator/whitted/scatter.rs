@@ -8,11 +8,11 @@ use crate::accel::{LANES, RayBlock, RayQuery};
 use crate::color::{Rgb, Wavelength};
 use crate::material::{Dielectric, FresnelModel, Material, fresnel};
 use crate::medium::Interior;
-use crate::sampler::Dimensions;
+use crate::sampler::{Dimensions, Sampler};
 use crate::scene::{Cone, SurfacePoint};
 
 /// Surfaces between equal media that a ray passes at most.
-const MAX_PASSED: u32 = 1 << 12;
+const MAX_PASSED: u16 = 1 << 12;
 
 /// Fewer rays than this are traced one by one.
 const MIN_PACKET: usize = 6;
@@ -110,7 +110,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     }
 
     /// The ray that a surface mirrors.
-    #[inline]
+    #[inline(always)]
     fn mirrored(&mut self, fork: &Fork<'_>, throughput: Rgb, wavelength: f32) {
         let d = fork.node.ray.direction;
         let mut direction = fresnel::reflect(d, fork.n);
@@ -120,7 +120,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         }
         let (interior, way) = (fork.node.interior, Way::Mirrored);
         let cone = fork.cone.turned(2.0);
-        self.child(fork, &Branch { direction, throughput, interior, way, cone, wavelength });
+        self.child(fork, Branch { direction, throughput, interior, way, cone, wavelength });
     }
 
     /// The two rays of a surface between two media: of glass and air, of two glasses, or of one
@@ -174,7 +174,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         let throughput = of_one * (1.0 - reflected);
         let (interior, way) = (crossing.beyond, Way::Refracted);
         let cone = fork.cone.turned((1.0 - n_i / n_t).abs());
-        self.child(fork, &Branch { direction, throughput, interior, way, cone, wavelength });
+        self.child(fork, Branch { direction, throughput, interior, way, cone, wavelength });
     }
 
     /// The ray that goes straight on, through a surface that is none.
@@ -204,12 +204,22 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         (wavelength.nanometres(), wavelength.rgb_weight())
     }
 
+    /// Whether a branch of little weight goes on: with the probability `survival`, in proportion to its
+    /// weight, as it then stands for those that ended.
+    #[cold]
+    fn survives(&mut self, sampler: &Sampler, survival: f32) -> bool {
+        let [u, ..] = sampler.four(Dimensions::Roulette);
+        let goes_on = u < survival;
+        self.counts.ends.roulette += u64::from(!goes_on);
+        goes_on
+    }
+
     /// Puts the next ray of a branch on the stack, if none of the rules ends it.
-    #[inline]
-    fn child(&mut self, fork: &Fork<'_>, branch: &Branch) {
+    #[inline(always)]
+    fn child(&mut self, fork: &Fork<'_>, branch: Branch) {
         let settings = &self.scene.settings;
         let node = fork.node;
-        let &Branch { direction, mut throughput, interior, way, cone, wavelength } = branch;
+        let Branch { direction, mut throughput, interior, way, cone, wavelength } = branch;
         let weight = throughput.max_component();
         // What does not count at all was no branch. Also refuses NaN.
         if !(weight > 0.0) {
@@ -219,17 +229,19 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             self.counts.ends.depth += 1;
             return;
         }
-        let sampler = node.sampler.branch(BRANCHES + way as u32);
+        // Elsewhere nothing is drawn at random beyond the camera.
+        let sampler = if F::EVERYTHING || settings.roulette {
+            node.sampler.branch(BRANCHES + way as u32)
+        } else {
+            node.sampler
+        };
         if weight < settings.prune {
             if !settings.roulette {
                 self.counts.ends.prune += 1;
                 return;
             }
-            // It goes on with a probability in proportion to its weight, and stands for those that ended.
             let survival = weight / settings.prune;
-            let [u, ..] = sampler.four(Dimensions::Roulette);
-            if u >= survival {
-                self.counts.ends.roulette += 1;
+            if !self.survives(&sampler, survival) {
                 return;
             }
             throughput *= 1.0 / survival;
