@@ -21,10 +21,10 @@ demo: build ## Renders scenes/showcase.toml to out/showcase.exr and out/showcase
 
 test: ## Runs every test, with and without Embree
 	@$(SETUP) test
-	$(CARGO) test --locked
-	$(CARGO) test --locked --no-default-features
+	PROPTEST_RNG_SEED=1 $(CARGO) test --locked
+	PROPTEST_RNG_SEED=1 $(CARGO) test --locked --no-default-features
 
-verify: test ## Runs what takes longer: many more random rays and scenes
+verify: test ## Runs what takes longer: many more random rays and scenes, others each time
 	ALHAZEN_VERIFY=1 $(CARGO) test --locked --release
 
 bench: setup ## Measures ray queries, the variants, every option, and other renderers

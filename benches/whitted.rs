@@ -212,6 +212,10 @@ impl<Q: RayQuery> RayQuery for Recorder<'_, Q> {
         self.query.occluded(ray)
     }
 
+    fn occluded_by_opaque(&self, ray: &Ray) -> bool {
+        self.query.occluded_by_opaque(ray)
+    }
+
     fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
         self.note(Query::ClosestBlock(Box::new(rays.clone())));
         self.query.intersect_block(rays)

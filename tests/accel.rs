@@ -111,7 +111,8 @@ fn random_world(random: &mut Random) -> World {
             Geometry::Mesh(ball(6, random.in_cube() * 2.0, random.between(0.2, 1.0), 0.2)),
         ];
         geometries.extend(framed_shapes(random, n / 4));
-        Group { geometries }
+        let clear = (0..geometries.len()).map(|i| i % 3 == 1).collect();
+        Group { geometries, clear }
     };
     let root = group(12);
     let prototypes = vec![group(6), group(3)];
@@ -142,16 +143,17 @@ fn tolerance(ray: &Ray, hit: &Hit) -> f32 {
 /// Rays that graze an edge may fall either way. They are told by moving the ray sideways a little: if
 /// the oracle changes its mind, either answer is right.
 fn is_borderline(oracle: &BruteForce, ray: &Ray, expected: &Option<Hit>) -> bool {
-    let (a, b) = ray.direction.any_orthonormal_pair();
-    let nudge = 4e-5;
-    [a, -a, b, -b].into_iter().any(|side| {
-        let moved = Ray { origin: ray.origin + side * nudge, ..*ray };
-        match (oracle.intersect(&moved), expected) {
-            (Some(x), Some(y)) => (x.t - y.t).abs() > 0.02 || who(&x) != who(y),
-            (None, None) => false,
-            _ => true,
-        }
+    nudged(ray).into_iter().any(|moved| match (oracle.intersect(&moved), expected) {
+        (Some(x), Some(y)) => (x.t - y.t).abs() > 0.02 || who(&x) != who(y),
+        (None, None) => false,
+        _ => true,
     })
+}
+
+/// The ray, moved sideways a little.
+fn nudged(ray: &Ray) -> [Ray; 4] {
+    let (a, b) = ray.direction.any_orthonormal_pair();
+    [a, -a, b, -b].map(|side| Ray { origin: ray.origin + side * 4e-5, ..*ray })
 }
 
 /// How fast the distance to what was hit changes as the ray moves sideways: the tangent of the angle of
@@ -177,6 +179,11 @@ fn check(oracle: &BruteForce, accel: &EmbreeAccel, rays: &[Ray], seed: u64) -> u
         let got = accel.intersect(ray);
         assert_eq!(accel.occluded(ray), got.is_some(), "seed {seed}: {ray:?}");
         assert_eq!(oracle.occluded(ray), expected.is_some(), "seed {seed}: {ray:?}");
+        let opaque = oracle.occluded_by_opaque(ray);
+        if accel.occluded_by_opaque(ray) != opaque {
+            let moves = nudged(ray).map(|moved| oracle.occluded_by_opaque(&moved));
+            assert!(moves.into_iter().any(|moved| moved != opaque), "seed {seed}: {ray:?}");
+        }
         let same = match (&expected, &got) {
             (Some(e), Some(g)) => {
                 // What is off across the surface is off along the ray by the inverse cosine.
@@ -235,11 +242,15 @@ fn blocks_agree_with_single_rays() {
             assert_eq!(block.active(), active);
             let hits = accel.intersect_block(&block);
             let occluded = accel.occluded_block(&block);
+            let by_opaque = accel.occluded_by_opaque_block(&block);
+            assert_eq!(by_opaque & !occluded, 0);
             for lane in 0..LANES {
                 if active >> lane & 1 == 0 {
                     assert!(hits.get(lane).is_none() && occluded >> lane & 1 == 0);
                     continue;
                 }
+                let opaque = accel.occluded_by_opaque(&block.get(lane));
+                assert_eq!(by_opaque >> lane & 1 == 1, opaque, "seed {seed}");
                 let alone = accel.intersect(&block.get(lane));
                 let hit = hits.get(lane);
                 assert_eq!(hit.is_some(), alone.is_some(), "seed {seed}");
@@ -258,7 +269,10 @@ fn blocks_agree_with_single_rays() {
 #[test]
 fn many_copies_become_an_array_with_the_same_hits() {
     let mut random = Random(77);
-    let prototype = Group { geometries: vec![Geometry::Mesh(ball(4, DVec3::ZERO, 0.4, 0.1))] };
+    let prototype = Group {
+        geometries: vec![Geometry::Mesh(ball(4, DVec3::ZERO, 0.4, 0.1))],
+        ..Group::default()
+    };
     let n = 70_000u32;
     let place = |i: u32| {
         let at = DVec3::new(f64::from(i % 300), 0.0, f64::from(i / 300));
@@ -289,7 +303,7 @@ fn robust_loses_no_ray_at_edges() {
             [[a, b], [b, c], [c, a]]
         })
         .collect();
-    let group = Group { geometries: vec![Geometry::Mesh(mesh)] };
+    let group = Group { geometries: vec![Geometry::Mesh(mesh)], ..Group::default() };
     let world = World { root: group, ..World::default() };
     let lost = |precision: Precision| {
         let accel = embree(&world, precision);

@@ -71,7 +71,10 @@ fn a_light_does_not_block_itself() {
         let size = 10f64.powf(random.between(-3.0, 3.0));
         let at = random.in_cube() * size * 10f64.powf(random.between(-1.0, 3.0));
         let (light, geometry) = light(&mut random, at, size);
-        let world = World { root: Group { geometries: vec![geometry] }, ..World::default() };
+        let world = World {
+            root: Group { geometries: vec![geometry], ..Group::default() },
+            ..World::default()
+        };
         let kind = AccelKind::ALL[round % AccelKind::ALL.len()];
         let options = BuildOptions { kind, ..BuildOptions::default() };
         let accel = Accel::build(&world, &options, &|_| true).expect("a sound world");

@@ -296,6 +296,36 @@ fn light_passes_glass_as_the_user_chose() {
     }
 }
 
+/// Where all glass is clear, shadow rays take no notice of it; they see what they would by passing it
+/// surface by surface, as they do where any of it absorbs light, be it next to nothing.
+#[test]
+fn clear_glass_hides_nothing_however_it_is_passed() {
+    let picture_with = |shadows, absorption: f32| {
+        let mut desc = glass_balls();
+        desc.settings.shadows = shadows;
+        let absorption = Rgb::splat(absorption);
+        let faint = Material::Dielectric(Dielectric { absorption, ..glass(1.3) });
+        add_material(&mut desc, "faint", faint);
+        add_sphere(&mut desc, DVec3::new(0.0, 1.2, 0.3), 0.3, "faint");
+        let pane = block(DVec3::new(-2.0, 1.7, -2.0), DVec3::new(0.3, 1.8, 2.0));
+        add_mesh(&mut desc, pane, "faint");
+        white(&mut desc);
+        add_sphere(&mut desc, DVec3::new(-0.3, 0.8, -0.4), 0.2, "white");
+        add_mesh(&mut desc, floor(3.0), "white");
+        let (direction, irradiance) = (DVec3::new(-0.3, -1.0, 0.2), Rgb::splat(2.0));
+        desc.lights.push(LightDesc::Directional { direction, irradiance });
+        picture(&desc).mean
+    };
+    let difference = |a: &[Rgb], b: &[Rgb]| {
+        let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from((a.g - b.g).abs())).sum();
+        sum / a.len() as f64
+    };
+    let clear = picture_with(Shadows::Tinted, 0.0);
+    assert!(difference(&clear, &picture_with(Shadows::Tinted, 1e-12)) < 1e-5);
+    assert!(difference(&clear, &picture_with(Shadows::Opaque, 0.0)) > 1e-2);
+    assert!(difference(&clear, &picture_with(Shadows::None, 0.0)) > 1e-3);
+}
+
 /// Behind an edge at height h under a lamp of width w at height H, the penumbra is w·h/(H − h) wide, full
 /// light on one side and none on the other.
 #[test]

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::world::{CopyRef, Geometry, World, affine_from_rows};
+use super::world::{CopyRef, Geometry, Group, World, affine_from_rows};
 use super::{AccelInfo, Hit, RayQuery};
 use crate::geometry::{AnalyticShape, intersect_triangle, with_shapes};
 use crate::math::{Bounds, Ray};
@@ -19,6 +19,7 @@ pub struct BruteForce {
 #[derive(Debug)]
 struct Part {
     geometry: Geometry,
+    is_clear: bool,
     bounds: Bounds,
 }
 
@@ -33,7 +34,10 @@ struct Copy {
 impl BruteForce {
     /// Takes references to the geometry of `world`; nothing is built.
     pub fn new(world: &World) -> Self {
-        let parts = |geometries: &[Geometry]| geometries.iter().map(Part::new).collect();
+        let parts = |group: &Group| {
+            let geometries = group.geometries.iter().enumerate();
+            geometries.map(|(i, geometry)| Part::new(geometry, group.is_clear(i))).collect()
+        };
         let copies = (0u32..).zip(&world.sets).flat_map(|(set, s)| {
             (0u32..).zip(s.transforms.iter()).map(move |(index, rows)| Copy {
                 id: CopyRef { set, index },
@@ -42,8 +46,8 @@ impl BruteForce {
             })
         });
         Self {
-            root: parts(&world.root.geometries),
-            prototypes: world.prototypes.iter().map(|g| parts(&g.geometries)).collect(),
+            root: parts(&world.root),
+            prototypes: world.prototypes.iter().map(parts).collect(),
             copies: copies.collect(),
         }
     }
@@ -54,16 +58,18 @@ impl BruteForce {
         AccelInfo { name: "brute force".into(), isa: "f64", packet_width: 1, bytes: bytes as u64 }
     }
 
-    /// Calls `found` with every hit in turn; it returns how far to go on looking.
+    /// Calls `found` with every hit in turn, but on parts that the ray passes; it returns how far to go
+    /// on looking.
     fn visit(
         &self,
         ray: &Ray,
+        passes: impl Fn(&Part) -> bool,
         mut found: impl FnMut(f64, f64, f64, [u32; 2], Option<CopyRef>) -> f64,
     ) {
         let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
         let (t_min, mut t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
         let mut visit = |parts: &[Part], o: DVec3, d: DVec3, copy: Option<CopyRef>| {
-            for (geometry, part) in (0u32..).zip(parts) {
+            for (geometry, part) in (0u32..).zip(parts).filter(|(_, part)| !passes(part)) {
                 part.visit(o, d, t_min, &mut t_max, |t, u, v, primitive| {
                     found(t, u, v, [geometry, primitive], copy)
                 });
@@ -78,13 +84,27 @@ impl BruteForce {
     }
 }
 
+impl BruteForce {
+    /// Whether the ray hits anything but parts that it passes.
+    fn hits_any(&self, ray: &Ray, passes: impl Fn(&Part) -> bool) -> bool {
+        let mut any = false;
+        self.visit(ray, passes, |_, _, _, _, _| {
+            any = true;
+            // Nothing is nearer than nothing: every further test fails at once.
+            f64::NEG_INFINITY
+        });
+        any
+    }
+}
+
 impl Part {
-    fn new(geometry: &Geometry) -> Self {
+    fn new(geometry: &Geometry, is_clear: bool) -> Self {
         let b = geometry.bounds();
         let pad = DVec3::splat(
             1e-9 * (b.size().max_element() + b.min.abs().max(b.max.abs()).max_element()),
         );
-        Self { geometry: geometry.clone(), bounds: Bounds { min: b.min - pad, max: b.max + pad } }
+        let bounds = Bounds { min: b.min - pad, max: b.max + pad };
+        Self { geometry: geometry.clone(), is_clear, bounds }
     }
 
     fn visit(
@@ -132,21 +152,23 @@ fn visit_each<S: AnalyticShape>(
 impl RayQuery for BruteForce {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut closest = None;
-        self.visit(ray, |t, u, v, [geometry, primitive], copy| {
-            let (t32, u, v) = (t as f32, u as f32, v as f32);
-            closest = Some(Hit { t: t32, u, v, primitive, geometry, copy });
-            t
-        });
+        self.visit(
+            ray,
+            |_| false,
+            |t, u, v, [geometry, primitive], copy| {
+                let (t32, u, v) = (t as f32, u as f32, v as f32);
+                closest = Some(Hit { t: t32, u, v, primitive, geometry, copy });
+                t
+            },
+        );
         closest
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        let mut any = false;
-        self.visit(ray, |_, _, _, _, _| {
-            any = true;
-            // Nothing is nearer than nothing: every further test fails at once.
-            f64::NEG_INFINITY
-        });
-        any
+        self.hits_any(ray, |_| false)
+    }
+
+    fn occluded_by_opaque(&self, ray: &Ray) -> bool {
+        self.hits_any(ray, |part| part.is_clear)
     }
 }

@@ -23,6 +23,12 @@ use crate::math::Ray;
 /// rays that are up to a seventh slower.
 const ARRAY_FROM: usize = 1 << 16;
 
+/// Masks of geometries, and of the rays that see them: a copy has Embree's default, that of what is
+/// opaque, so such rays enter it.
+const OPAQUE: u32 = 1;
+const CLEAR: u32 = 2;
+const ALL: u32 = !0;
+
 /// A committed Embree scene.
 #[derive(Debug)]
 pub struct EmbreeAccel {
@@ -177,7 +183,21 @@ impl EmbreeAccel {
         hits
     }
 
-    fn occluded_packets<const N: usize>(&self, rays: &RayBlock) -> u16 {
+    /// Which active rays are blocked by geometry of a mask.
+    #[inline]
+    fn occluded_in_packets(&self, rays: &RayBlock, mask: u32) -> u16 {
+        match self.packet_width {
+            16 => self.occluded_packets::<16>(rays, mask),
+            8 => self.occluded_packets::<8>(rays, mask),
+            4 => self.occluded_packets::<4>(rays, mask),
+            _ => rays
+                .lanes()
+                .filter(|&lane| self.scene.occluded_by(&native(&rays.get(lane)), mask))
+                .fold(0, |bits, lane| bits | 1 << lane),
+        }
+    }
+
+    fn occluded_packets<const N: usize>(&self, rays: &RayBlock, mask: u32) -> u16 {
         let mut occluded = 0;
         for start in (0..LANES).step_by(N) {
             let bits = lane_bits::<N>(rays.active(), start);
@@ -185,6 +205,7 @@ impl EmbreeAccel {
                 continue;
             }
             let mut packet = load::<N>(rays, start);
+            packet.mask = [mask; N];
             self.scene.occluded_packet(&PacketMask::from_bits(bits), &mut packet);
             for i in lanes_of(bits as u16).filter(|&i| packet.is_occluded(i)) {
                 occluded |= 1 << (start + i);
@@ -206,6 +227,11 @@ impl RayQuery for EmbreeAccel {
     }
 
     #[inline]
+    fn occluded_by_opaque(&self, ray: &Ray) -> bool {
+        self.scene.occluded_by(&native(ray), OPAQUE)
+    }
+
+    #[inline]
     fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
         match self.packet_width {
             16 => self.intersect_packets::<16>(rays),
@@ -217,15 +243,12 @@ impl RayQuery for EmbreeAccel {
 
     #[inline]
     fn occluded_block(&self, rays: &RayBlock) -> u16 {
-        match self.packet_width {
-            16 => self.occluded_packets::<16>(rays),
-            8 => self.occluded_packets::<8>(rays),
-            4 => self.occluded_packets::<4>(rays),
-            _ => rays
-                .lanes()
-                .filter(|&lane| self.occluded(&rays.get(lane)))
-                .fold(0, |bits, lane| bits | 1 << lane),
-        }
+        self.occluded_in_packets(rays, ALL)
+    }
+
+    #[inline]
+    fn occluded_by_opaque_block(&self, rays: &RayBlock) -> u16 {
+        self.occluded_in_packets(rays, OPAQUE)
     }
 }
 
@@ -271,7 +294,7 @@ fn attach_group(
     quality: Quality,
 ) -> Result<(), EmbreeError> {
     for (index, geometry) in (0u32..).zip(&group.geometries) {
-        let geometry = match geometry {
+        let mut geometry = match geometry {
             Geometry::Mesh(mesh) => embree::Geometry::triangles(
                 device,
                 mesh.positions.shared(),
@@ -280,6 +303,9 @@ fn attach_group(
             )?,
             Geometry::Shapes(shapes) => with_shapes!(shapes, list => user_geometry(device, list))?,
         };
+        if group.is_clear(index as usize) {
+            geometry = geometry.masked(CLEAR)?;
+        }
         let id = builder.attach(geometry);
         // Hits are told apart by these ids: ours are Embree's.
         assert_eq!(id, index, "Embree numbers geometries in order");
@@ -357,8 +383,9 @@ fn outer_bounds(shape: &impl AnalyticShape) -> UserBounds {
 /// Shapes of one kind as Embree's callbacks see them: solved in f64.
 struct Shapes<S>(Arc<Vec<S>>);
 
+// Always inlined: Embree's callback is nothing but this, and is called two or three times a ray.
 impl<S: AnalyticShape> UserGeometry for Shapes<S> {
-    #[inline]
+    #[inline(always)]
     fn intersect(&self, primitive: u32, ray: &embree::Ray) -> Option<UserHit> {
         let shape = self.0.get(primitive as usize)?;
         let (origin, direction, t_min, t_max) = widened(ray);
@@ -366,7 +393,7 @@ impl<S: AnalyticShape> UserGeometry for Shapes<S> {
         Some(UserHit { t: hit.t as f32, u: Hit::u_of_part(hit.part), v: 0.0 })
     }
 
-    #[inline]
+    #[inline(always)]
     fn occluded(&self, primitive: u32, ray: &embree::Ray) -> bool {
         let Some(shape) = self.0.get(primitive as usize) else { return false };
         let (origin, direction, t_min, t_max) = widened(ray);

@@ -30,6 +30,9 @@ pub trait RayQuery: Sync {
     /// Whether there is any such hit.
     fn occluded(&self, ray: &Ray) -> bool;
 
+    /// Whether anything is hit that light does not pass ([`Group::clear`]).
+    fn occluded_by_opaque(&self, ray: &Ray) -> bool;
+
     /// The closest hits of rays that run close together.
     fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
         HitBlock::from_fn(rays.active(), |lane| self.intersect(&rays.get(lane)))
@@ -39,6 +42,13 @@ pub trait RayQuery: Sync {
     fn occluded_block(&self, rays: &RayBlock) -> u16 {
         rays.lanes()
             .filter(|&lane| self.occluded(&rays.get(lane)))
+            .fold(0, |bits, lane| bits | 1 << lane)
+    }
+
+    /// Which active rays of such a block are blocked by what light does not pass, as bits.
+    fn occluded_by_opaque_block(&self, rays: &RayBlock) -> u16 {
+        rays.lanes()
+            .filter(|&lane| self.occluded_by_opaque(&rays.get(lane)))
             .fold(0, |bits, lane| bits | 1 << lane)
     }
 }

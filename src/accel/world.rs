@@ -21,6 +21,9 @@ pub enum Geometry {
 pub struct Group {
     /// Addressed by [`super::Hit::geometry`].
     pub geometries: Vec<Geometry>,
+    /// Which of them light passes without loss ([`super::RayQuery::occluded_by_opaque`]); none where
+    /// nothing is said.
+    pub clear: Vec<bool>,
 }
 
 /// An affine transform in f32: three rows of four, row-major, target from source.
@@ -60,6 +63,11 @@ impl Group {
     pub fn bounds(&self) -> Bounds {
         let bounds = self.geometries.iter().map(Geometry::bounds).filter(Bounds::is_finite);
         bounds.fold(Bounds::EMPTY, Bounds::union)
+    }
+
+    /// Whether light passes a geometry without loss.
+    pub fn is_clear(&self, geometry: usize) -> bool {
+        self.clear.get(geometry).is_some_and(|is_clear| *is_clear)
     }
 }
 

@@ -161,6 +161,11 @@ impl Device {
         .map_or(1, |(width, _)| width)
     }
 
+    /// Whether rays may be masked from geometry.
+    pub(super) fn has_ray_masks(&self) -> bool {
+        self.property(sys::RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) != 0
+    }
+
     /// The instruction set that queries run with. Embree has no property for it: it follows from the
     /// native packet width, the processor and the configuration.
     pub fn isa(&self) -> Isa {

@@ -35,6 +35,9 @@ pub enum EmbreeError {
     /// A geometry or an instanced scene belongs to another device than its scene.
     #[error("geometry and scene belong to different Embree devices")]
     ForeignDevice,
+    /// Geometry is to be hidden from some rays, which this Embree cannot.
+    #[error("this Embree was built without ray masks (EMBREE_RAY_MASK)")]
+    NoRayMasks,
 }
 
 /// Embree's error codes (`RTCError`).

@@ -197,6 +197,20 @@ impl Geometry {
         geometry.commit("set up an instance array")
     }
 
+    /// The same, seen only by rays whose mask has a bit in common with `mask`. Without this the mask of
+    /// a geometry is 1.
+    ///
+    /// # Errors
+    /// [`EmbreeError::NoRayMasks`] where Embree was built without them.
+    pub fn masked(self, mask: u32) -> Result<Self, EmbreeError> {
+        if !self.device.has_ray_masks() {
+            return Err(EmbreeError::NoRayMasks);
+        }
+        // SAFETY: the geometry is live and ours alone.
+        unsafe { sys::rtcSetGeometryMask(self.raw(), mask) };
+        self.commit("set the mask of a geometry")
+    }
+
     fn instanced_scene(&mut self, scene: &Scene) -> Result<(), EmbreeError> {
         if !scene.device().is(&self.device) {
             return Err(EmbreeError::ForeignDevice);

@@ -107,7 +107,8 @@ pub struct RayPacket<const N: usize> {
     pub dir_z: [f32; N],
     time: [f32; N],
     pub t_max: [f32; N],
-    mask: [u32; N],
+    /// Geometry whose mask has no bit in common is not seen.
+    pub mask: [u32; N],
     id: [u32; N],
     flags: [u32; N],
 }

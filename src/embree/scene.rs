@@ -182,7 +182,13 @@ impl Scene {
     /// Whether anything blocks one ray.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        let mut native = ray.to_native();
+        self.occluded_by(ray, !0)
+    }
+
+    /// Whether anything whose mask has a bit in common with `mask` blocks one ray.
+    #[inline]
+    pub fn occluded_by(&self, ray: &Ray, mask: u32) -> bool {
+        let mut native = sys::RTCRay { mask, ..ray.to_native() };
         // SAFETY: as in `intersect`.
         unsafe { sys::rtcOccluded1(self.raw(), &raw mut native, null_mut()) };
         native.tfar == f32::NEG_INFINITY

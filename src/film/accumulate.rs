@@ -18,17 +18,18 @@ pub const BLOCK_LANES: usize = 16;
 #[derive(Debug, Clone, Copy)]
 struct Node {
     count: [u32; BLOCK_LANES],
-    sum: [[f64; 3]; BLOCK_LANES],
+    /// By channel.
+    sum: [[f64; BLOCK_LANES]; 3],
 }
 
 impl Node {
-    const EMPTY: Self = Self { count: [0; BLOCK_LANES], sum: [[0.0; 3]; BLOCK_LANES] };
+    const EMPTY: Self = Self { count: [0; BLOCK_LANES], sum: [[0.0; BLOCK_LANES]; 3] };
 
     fn join(&mut self, later: &Self) {
         for lane in 0..BLOCK_LANES {
             self.count[lane] += later.count[lane];
             for c in 0..3 {
-                self.sum[lane][c] += later.sum[lane][c];
+                self.sum[c][lane] += later.sum[c][lane];
             }
         }
     }
@@ -107,7 +108,9 @@ impl BlockAccumulator {
             }
             if value.is_finite() {
                 leaf.count[lane] = 1;
-                leaf.sum[lane] = value.to_array().map(f64::from);
+                for (sum, x) in leaf.sum.iter_mut().zip(value.to_array()) {
+                    sum[lane] = f64::from(x);
+                }
             } else {
                 dropped |= 1 << lane;
             }
@@ -127,27 +130,39 @@ impl BlockAccumulator {
             mean: [Rgb::BLACK; BLOCK_LANES],
             standard_error: [Rgb::splat(f32::NAN); BLOCK_LANES],
         };
-        for lane in 0..BLOCK_LANES {
-            let count: u32 = totals.iter().map(|t| t.count[lane]).sum();
-            if count == 0 {
-                continue;
+        // Samples of each pixel, and replicates that have any.
+        let (mut n, mut filled) = ([0.0; BLOCK_LANES], [0.0; BLOCK_LANES]);
+        for total in &totals {
+            for lane in 0..BLOCK_LANES {
+                n[lane] += f64::from(total.count[lane]);
+                filled[lane] += f64::from(total.count[lane].min(1));
             }
-            let n = f64::from(count);
-            let filled = || totals.iter().filter(|t| t.count[lane] > 0);
-            let mean: [f64; 3] =
-                std::array::from_fn(|c| totals.iter().map(|t| t.sum[lane][c]).sum::<f64>() / n);
-            pixels.mean[lane] = mean.map(|x| x as f32).into();
-            let degrees = filled().count() as f64 - 1.0;
-            if degrees > 0.0 {
-                // Weighted by their counts, as the last replicates may be one sample short.
-                let variance: [f64; 3] = std::array::from_fn(|c| {
-                    let spread = filled().map(|t| {
-                        let k = f64::from(t.count[lane]);
-                        k * (t.sum[lane][c] / k - mean[c]).powi(2)
-                    });
-                    spread.sum::<f64>() / (n * degrees)
-                });
-                pixels.standard_error[lane] = variance.map(|x| x.sqrt() as f32).into();
+        }
+        // Channel by channel, all pixels side by side; what was not sampled comes out as NaN.
+        let channels: [_; 3] = std::array::from_fn(|c| {
+            let (mut mean, mut variance) = ([0.0; BLOCK_LANES], [0.0; BLOCK_LANES]);
+            for total in &totals {
+                mean.iter_mut().zip(&total.sum[c]).for_each(|(mean, sum)| *mean += sum);
+            }
+            mean.iter_mut().zip(&n).for_each(|(mean, n)| *mean /= n);
+            // Weighted by their counts, as the last replicates may be one sample short.
+            for total in &totals {
+                for lane in 0..BLOCK_LANES {
+                    let k = f64::from(total.count[lane]);
+                    let spread = k * (total.sum[c][lane] / k - mean[lane]).powi(2);
+                    variance[lane] += if k > 0.0 { spread } else { 0.0 };
+                }
+            }
+            for lane in 0..BLOCK_LANES {
+                variance[lane] /= n[lane] * (filled[lane] - 1.0);
+            }
+            (mean, variance)
+        });
+        for lane in (0..BLOCK_LANES).filter(|lane| n[*lane] > 0.0) {
+            pixels.mean[lane] = std::array::from_fn(|c| channels[c].0[lane] as f32).into();
+            if filled[lane] > 1.0 {
+                pixels.standard_error[lane] =
+                    std::array::from_fn(|c| channels[c].1[lane].sqrt() as f32).into();
             }
         }
         pixels

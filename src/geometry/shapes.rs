@@ -134,6 +134,18 @@ impl Shapes {
         })
     }
 
+    /// The others, and those whose index is `chosen`, each in order.
+    #[must_use]
+    pub fn split(&self, chosen: impl Fn(usize) -> bool) -> [Self; 2] {
+        with_shapes!(self, list => {
+            let part = |is_chosen| {
+                let indices = (0..list.len()).filter(|i| chosen(*i) == is_chosen);
+                Self::from(indices.map(|i| Clone::clone(&list[i])).collect::<Vec<_>>())
+            };
+            [part(false), part(true)]
+        })
+    }
+
     /// All of them moved, without a copy where nothing else holds the list.
     #[must_use]
     pub fn translated(mut self, by: DVec3) -> Self {

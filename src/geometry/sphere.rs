@@ -50,15 +50,17 @@ impl AnalyticShape for Sphere {
         }
         let b = l.dot(direction);
         let c = l.length_squared() - r2;
+        // Outside and on the way from it, as rays are from the sphere that they just left.
+        if b <= 0.0 && c > 0.0 && t_min >= 0.0 {
+            return None;
+        }
         let q = b + disc.sqrt().copysign(b);
+        let hit = |t: f64| (t > t_min && t <= t_max).then(|| ShapeHit::at(t));
         // q = 0 only for a tangent ray that starts at the point of contact: c/q is NaN, and no hit.
-        let (t0, t1) = if b > 0.0 { (c / q, q / d2) } else { (q / d2, c / q) };
-        if t0 > t_min && t0 <= t_max {
-            Some(ShapeHit::at(t0))
-        } else if t1 > t_min && t1 <= t_max {
-            Some(ShapeHit::at(t1))
+        if b > 0.0 {
+            hit(c / q).or_else(|| hit(q / d2))
         } else {
-            None
+            hit(q / d2).or_else(|| hit(c / q))
         }
     }
 

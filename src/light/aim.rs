@@ -28,7 +28,7 @@ pub(super) fn aim(p: DVec3, target: DVec3, short: f64, irradiance: Rgb) -> Optio
     if !(distance > 0.0) {
         return None;
     }
-    Some(LightSample { direction: (to_target / length).as_vec3(), distance, irradiance })
+    Some(LightSample { direction: (to_target * (1.0 / length)).as_vec3(), distance, irradiance })
 }
 
 /// How far off a light's surface a shadow ray must end, so that the surface does not block it.

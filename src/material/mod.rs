@@ -104,6 +104,12 @@ impl Material {
         matches!(self, Self::Diffuse { .. } | Self::Phong(_))
     }
 
+    /// Whether light passes it.
+    #[inline]
+    pub fn is_glass(&self) -> bool {
+        matches!(self, Self::Dielectric(_))
+    }
+
     /// Whether it sends rays on.
     #[inline]
     pub fn is_specular(&self) -> bool {

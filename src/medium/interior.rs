@@ -38,6 +38,10 @@ impl Interior {
     #[must_use]
     pub const fn left(self, index: u16) -> Self {
         let id = index + 1;
+        // Nearly always it is inside of nothing else.
+        if self.0 == id as u128 {
+            return Self::OUTSIDE;
+        }
         let mut shift = 0;
         while shift < u128::BITS {
             if (self.0 >> shift) as u16 == id {
@@ -59,9 +63,12 @@ impl Interior {
     #[inline]
     pub fn current(self, priority: impl Fn(u16) -> i32) -> Option<u16> {
         // Nearly always there is one at most.
-        if self.0 >> SLOT == 0 {
-            return (self.0 as u16).checked_sub(1);
-        }
+        if self.0 >> SLOT == 0 { (self.0 as u16).checked_sub(1) } else { self.highest(priority) }
+    }
+
+    /// The one of highest priority, among equals the one entered last.
+    #[cold]
+    fn highest(self, priority: impl Fn(u16) -> i32) -> Option<u16> {
         let mut best: Option<u16> = None;
         let mut rest = self.0;
         while rest != 0 {

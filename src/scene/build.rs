@@ -6,8 +6,7 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3};
 
 use super::desc::{
-    CameraDesc, LensDesc, Location, MaterialDesc, PlaceDesc, Reference, RenderSettings, SceneDesc,
-    Tolerance,
+    CameraDesc, LensDesc, Location, PlaceDesc, Reference, RenderSettings, SceneDesc, Tolerance,
 };
 use super::draft::{GeometryLooks, Look};
 use super::lights::{
@@ -15,7 +14,7 @@ use super::lights::{
 };
 use super::maps::Maps;
 use super::place::{Placed, place};
-use super::requirements::{Contents, Requirements};
+use super::requirements::{Contents, Requirements, has_clear_shadows};
 use super::surface::SurfacePoint;
 use super::tessellate::{Tessellation, tessellate};
 use super::volumes::{check_volumes, placed_volumes};
@@ -331,7 +330,12 @@ impl Scene {
                 errors.extend(more);
                 Vec::new()
             });
-        let placed = place(&mut desc, &material_names, &prototype_names, &maps, &glows);
+        let mut clear = Vec::new();
+        if has_clear_shadows(&desc.settings, desc.materials.iter().map(|m| &m.material)) {
+            clear.push(false);
+            clear.extend(desc.materials.iter().map(|m| m.material.is_glass()));
+        }
+        let placed = place(&mut desc, &material_names, &prototype_names, &maps, &glows, &clear);
         let placed = match placed {
             Ok(placed) if errors.is_empty() => placed,
             Ok(_) => return Err(errors),
@@ -530,8 +534,7 @@ fn recentred(mut fog: Fog, center: DVec3) -> Fog {
 /// Mistakes that only the list of materials as a whole shows.
 fn check_materials(desc: &SceneDesc) -> Option<SceneError> {
     let limit = usize::from(u16::MAX) - 1;
-    let is_glass = |m: &MaterialDesc| matches!(m.material, Material::Dielectric(_));
-    let (index, last) = desc.materials.iter().enumerate().rfind(|(_, m)| is_glass(m))?;
+    let (index, last) = desc.materials.iter().enumerate().rfind(|(_, m)| m.material.is_glass())?;
     let name = last.name.clone();
     (index >= limit).then_some(SceneError::TooManyMaterials { name, index, limit })
 }

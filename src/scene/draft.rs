@@ -83,14 +83,30 @@ impl Draft {
         list.into_iter().zip(looks).collect()
     }
 
-    /// The group to be traced, relative to `origin`. A mesh's last use takes its buffers.
+    /// Parts its lists of shapes into those of materials that are `clear` and those that are not.
+    fn part(&mut self, clear: &[bool]) {
+        let is_clear = |(material, _): &DraftLook| clear[*material as usize];
+        let parts = self.shapes.drain(..).flat_map(|(shapes, looks)| {
+            let [others, chosen] = shapes.split(|i| is_clear(&looks[i]));
+            let (of_chosen, of_others) = looks.into_iter().partition(is_clear);
+            [(others, of_others), (chosen, of_chosen)]
+        });
+        self.shapes = parts.filter(|(shapes, _)| !shapes.is_empty()).collect();
+    }
+
+    /// The group to be traced, relative to `origin`. A mesh's last use takes its buffers. Light passes
+    /// what is of a material that is `clear`; none of them is where that is empty.
     pub(super) fn group(
-        self,
+        mut self,
         origin: DVec3,
         meshes: &mut [Option<TriangleMesh>],
         uses_left: &mut [u32],
         frames: &mut Vec<DAffine3>,
+        clear: &[bool],
     ) -> (Group, Vec<GeometryLooks>) {
+        if !clear.is_empty() {
+            self.part(clear);
+        }
         let (mut geometries, mut looks) = (Vec::new(), Vec::new());
         let mut look = |&(material, frame): &DraftLook| {
             let Some(frame) = frame else { return Look { material, frame: 0 } };
@@ -109,7 +125,11 @@ impl Draft {
             geometries.push(Geometry::Shapes(shapes.translated(-origin)));
             looks.push(GeometryLooks::Each(draft_looks.iter().map(&mut look).collect()));
         }
-        (Group { geometries }, looks)
+        // Of one geometry all is clear or nothing.
+        let is_clear = |looks: &GeometryLooks| clear[looks.of(0).material as usize];
+        let clear =
+            if clear.is_empty() { Vec::new() } else { looks.iter().map(is_clear).collect() };
+        (Group { geometries, clear }, looks)
     }
 }
 

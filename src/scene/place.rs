@@ -70,13 +70,15 @@ struct Placer<'a> {
     errors: Vec<SceneError>,
 }
 
-/// Places everything that `desc` holds, taking its meshes and objects.
+/// Places everything that `desc` holds, taking its meshes and objects. `glows` and `clear` are by
+/// material; shadow rays take no notice of what is `clear`, which is empty where nothing is.
 pub(super) fn place(
     desc: &mut SceneDesc,
     materials: &NameIndex,
     prototype_names: &NameIndex,
     maps: &[Maps],
     glows: &[bool],
+    clear: &[bool],
 ) -> Result<Placed, Vec<SceneError>> {
     let mut mesh_uses = vec![0; desc.meshes.len()];
     let all = desc.prototypes.iter().flat_map(|p| &p.objects).chain(&desc.objects);
@@ -145,7 +147,7 @@ pub(super) fn place(
     }
     let frames = &mut placed.frames;
     let mut group =
-        |draft: Draft, origin: DVec3| draft.group(origin, &mut meshes, &mut uses_left, frames);
+        |draft: Draft, o: DVec3| draft.group(o, &mut meshes, &mut uses_left, frames, clear);
     (placed.world.root, placed.root_looks) = group(root, center);
     for ((draft, transforms), bounds) in drafts.into_iter().zip(&copies).zip(&bounds) {
         if !used(&draft, transforms) {

@@ -14,7 +14,8 @@ pub enum Variant {
     Local,
     /// And mirrors and glass.
     Tree,
-    /// And textures, area lights, many lights, glowing surfaces, fog, volumes, light through glass, dispersion.
+    /// And textures, area lights, many lights, glowing surfaces, fog, volumes, light dimmed by glass,
+    /// dispersion.
     Everything,
 }
 
@@ -55,6 +56,8 @@ pub struct Requirements {
     pub dielectrics: u64,
     /// Those whose index of refraction depends on the wavelength.
     pub dispersive: u64,
+    /// Those that absorb light.
+    pub absorbing: u64,
     /// Materials with textures, normal or bump maps.
     pub textured_materials: u64,
     /// Point lights with inverse-square falloff.
@@ -83,8 +86,25 @@ pub struct Requirements {
     pub shadow_rays: bool,
     /// Whether light passes glass on its way to surfaces.
     pub transparent_shadows: bool,
+    /// Whether it does so without loss, so that shadow rays need take no notice of glass.
+    pub clear_shadows: bool,
     /// Which variant of the ray tree is run.
     pub variant: Variant,
+}
+
+/// Whether there is glass, and light passes all of it without loss on its way to surfaces.
+pub(super) fn has_clear_shadows<'a>(
+    settings: &RenderSettings,
+    materials: impl IntoIterator<Item = &'a Material>,
+) -> bool {
+    let mut glasses = materials.into_iter().filter_map(|material| match material {
+        Material::Dielectric(glass) => Some(glass),
+        _ => None,
+    });
+    settings.shadows == Shadows::Tinted
+        && glasses.next().is_some_and(|first| {
+            first.absorption.is_black() && glasses.all(|glass| glass.absorption.is_black())
+        })
 }
 
 /// What a scene is made of.
@@ -154,6 +174,7 @@ impl Requirements {
                 Material::Dielectric(glass) => {
                     r.dielectrics += 1;
                     r.dispersive += u64::from(Ior::is_dispersive(&glass.ior));
+                    r.absorbing += u64::from(!glass.absorption.is_black());
                 }
             }
         }
@@ -173,6 +194,7 @@ impl Requirements {
         r.transparent_shadows = r.shadow_rays
             && r.dielectrics > 0
             && matches!(settings.shadows, Shadows::Tinted | Shadows::Fresnel);
+        r.clear_shadows = r.transparent_shadows && has_clear_shadows(settings, materials);
         r.variant = r.variant(settings);
         r
     }
@@ -186,7 +208,7 @@ impl Requirements {
             || self.glows
             || self.fog
             || self.volumes > 0
-            || self.transparent_shadows
+            || (self.transparent_shadows && !self.clear_shadows)
             || (is_tree && self.dispersive > 0)
         {
             return Variant::Everything;

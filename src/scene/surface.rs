@@ -143,7 +143,7 @@ fn on_triangle(mesh: &TriangleMesh, hit: &Hit) -> Local {
     let reach = (a - position).abs().max((b - position).abs()).max((c - position).abs());
     // In f64: the square of an f32 cross product overflows from edges of 4·10⁹ on, and vanishes below
     // 2·10⁻¹¹.
-    let [da, db, dc] = [a, b, c].map(Vec3::as_dvec3);
+    let (da, db, dc) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
     let geometric_normal = (db - da).cross(dc - da).normalize_or_zero().as_vec3();
     let normal = match &mesh.normals {
         None => geometric_normal,

@@ -13,11 +13,7 @@ const CHOICE: u32 = 1 << 31;
 impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Adds the light that arrives at the hits from all lights.
     #[inline]
-    pub(super) fn light<const N: usize>(
-        &mut self,
-        hits: &Hits<'_, F, N>,
-        node: &impl Fn(usize) -> Node,
-    ) {
+    pub(super) fn light<const N: usize>(&mut self, hits: &Hits<'_, F, N>, nodes: &[Node; N]) {
         let is_lit = |lane: &usize| hits.get(*lane).is_some_and(|(_, m)| m.is_lit());
         let lit = (0..N).filter(is_lit).fold(0u16, |bits, lane| bits | 1 << lane);
         if lit == 0 {
@@ -26,7 +22,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         let scene = self.scene;
         if !F::EVERYTHING {
             for light in &scene.lights {
-                self.cast::<N>(lit, hits, node, true, |lane| {
+                self.cast::<N>(lit, hits, nodes, true, |lane| {
                     light.sample(hits.points[lane].as_ref()?.position, [0.5; 2])
                 });
             }
@@ -38,15 +34,15 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             let index = scene.light_tree.as_ref().map_or(i as u32, |tree| tree.always()[i]);
             let light = &scene.lights[index as usize];
             if light.is_delta() {
-                self.cast::<N>(lit, hits, node, true, |lane| {
+                self.cast::<N>(lit, hits, nodes, true, |lane| {
                     light.sample(hits.points[lane].as_ref()?.position, [0.5; 2])
                 });
                 continue;
             }
             let n = scene.settings.shadow_samples;
             for k in 0..n {
-                self.cast::<N>(lit, hits, node, false, |lane| {
-                    let sampler = node(lane).sampler.branch(index).split(k, n);
+                self.cast::<N>(lit, hits, nodes, false, |lane| {
+                    let sampler = nodes[lane].sampler.branch(index).split(k, n);
                     let [u, v, ..] = sampler.four(Dimensions::Light);
                     let origin = scene.departure(hits.points[lane].as_ref()?);
                     Some(scaled(light.sample(origin, [u, v])?, 1.0 / n as f32))
@@ -56,9 +52,9 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         let Some(tree) = &scene.light_tree else { return };
         let n = scene.settings.light_samples;
         for k in 0..n {
-            self.cast::<N>(lit, hits, node, false, |lane| {
+            self.cast::<N>(lit, hits, nodes, false, |lane| {
                 let point = hits.points[lane].as_ref()?;
-                let sampler = node(lane).sampler.branch(CHOICE).split(k, n);
+                let sampler = nodes[lane].sampler.branch(CHOICE).split(k, n);
                 let [u, v, which, _] = sampler.four(Dimensions::Light);
                 let picked = tree.sample(point.position, Some(point.normal), which)?;
                 let light: &Light = &scene.lights[picked.index as usize];
@@ -76,12 +72,12 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         &mut self,
         lit: u16,
         hits: &Hits<'_, F, N>,
-        node: &impl Fn(usize) -> Node,
+        nodes: &[Node; N],
         is_coherent: bool,
         sample: impl Fn(usize) -> Option<LightSample>,
     ) {
         let scene = self.scene;
-        let in_packets = N == LANES && is_coherent && !self.sees_through();
+        let in_packets = N == LANES && is_coherent && !self.is_tinted();
         let mut packet = in_packets.then(RayBlock::empty);
         let mut shadow_rays = [const { Ray::new(glam::Vec3::ZERO, glam::Vec3::ZERO) }; N];
         let mut unshadowed = [Rgb::BLACK; N];
@@ -93,7 +89,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             if sample.direction.dot(point.geometric_normal) <= 0.0 {
                 continue;
             }
-            let node = node(lane);
+            let node = &nodes[lane];
             let response = material.response(point.normal, -node.ray.direction, sample.direction);
             if response.is_black() {
                 continue;
@@ -126,15 +122,15 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         let mut occluded = 0;
         if casts_shadows && let Some(packet) = &packet {
             self.counts.shadow += u64::from(waiting.count_ones());
-            occluded = self.query.occluded_block(packet);
+            occluded = self.blocked(packet);
         }
         for lane in (0..N).filter(|lane| waiting >> lane & 1 == 1) {
-            let to = node(lane).lane as usize;
+            let to = nodes[lane].lane as usize;
             if packet.is_some() || !casts_shadows {
                 if occluded >> lane & 1 == 0 {
                     self.radiance[to] += unshadowed[lane] * self.passes_volumes(&shadow_rays[lane]);
                 }
-            } else if let Some(transmittance) = self.arrives(&shadow_rays[lane], &node(lane)) {
+            } else if let Some(transmittance) = self.arrives(&shadow_rays[lane], &nodes[lane]) {
                 self.radiance[to] +=
                     unshadowed[lane] * transmittance * self.passes_volumes(&shadow_rays[lane]);
             }

@@ -32,7 +32,7 @@ use scatter::Way;
 pub trait Features: Send + Sync + 'static {
     /// Mirrored and refracted rays.
     const TREE: bool;
-    /// Textures, area lights, many lights, glowing surfaces, fog, light through glass, dispersion.
+    /// Textures, area lights, many lights, glowing surfaces, fog, light dimmed by glass, dispersion.
     const EVERYTHING: bool;
     /// What is kept of up to `N` hits for textures: nothing where there are none.
     type Textured<const N: usize>: TexturedHits;
@@ -130,6 +130,9 @@ impl<F> Whitted<F> {
     }
 }
 
+/// Rays that wait, for which there is room at the start: two of each lane of a block.
+const STACK: usize = 2 * LANES;
+
 /// A ray of the tree.
 #[derive(Debug, Clone, Copy)]
 struct Node {
@@ -147,9 +150,9 @@ struct Node {
     /// Bounces before it.
     depth: u32,
     /// Surfaces between equal media that it has passed straight.
-    passed: u32,
+    passed: u16,
     /// Which pixel of the block it belongs to.
-    lane: u32,
+    lane: u8,
     /// How it left its parent.
     way: Way,
     /// What of its way lies before its origin, where it did not begin there.
@@ -216,12 +219,12 @@ impl<F: Features> Integrator for Whitted<F> {
             max_depth: self.max_depth,
             camera,
             counts,
-            stack: Vec::new(),
+            stack: Vec::with_capacity(STACK),
             blocks: Vec::new(),
             radiance: [Rgb::BLACK; LANES],
             features: PhantomData,
         };
-        let node = |lane: usize| {
+        let mut nodes: [Node; LANES] = std::array::from_fn(|lane| {
             let ray = camera.rays.get(lane);
             Node {
                 cone: if F::EVERYTHING { Cone::of_pixel(scene, &ray) } else { Cone::default() },
@@ -232,18 +235,15 @@ impl<F: Features> Integrator for Whitted<F> {
                 wavelength: 0.0,
                 depth: 0,
                 passed: 0,
-                lane: lane as u32,
+                lane: lane as u8,
                 way: Way::Refracted,
-                before: if F::EVERYTHING { way_before(scene, &camera.rays.get(lane)) } else { 0.0 },
+                before: if F::EVERYTHING { way_before(scene, &ray) } else { 0.0 },
             }
-        };
-        let seen = if F::EVERYTHING && scene.fog.is_some() {
-            walk.before_the_scene(&node)
-        } else {
-            [Rgb::splat(1.0); LANES]
-        };
-        let node = |lane: usize| Node { throughput: seen[lane], ..node(lane) };
-        walk.shade::<LANES>(camera.rays.active(), |lane| camera.hits.get(lane), node);
+        });
+        if F::EVERYTHING && scene.fog.is_some() {
+            walk.before_the_scene(&mut nodes);
+        }
+        walk.shade(camera.rays.active(), &nodes, |lane| camera.hits.get(lane));
         if F::TREE {
             walk.run();
         }
@@ -260,14 +260,10 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         loop {
             while let Some(node) = self.stack.pop() {
                 let hit = self.query.intersect(&node.ray);
-                self.shade::<1>(1, |_| hit.as_ref(), |_| node);
+                self.shade(1, std::array::from_ref(&node), |_| hit.as_ref());
             }
             let Some(block) = self.blocks.pop() else { return };
-            self.shade::<LANES>(
-                block.active,
-                |lane| block.hits.get(lane),
-                |lane| block.nodes[lane],
-            );
+            self.shade(block.active, &block.nodes, |lane| block.hits.get(lane));
         }
     }
 
@@ -276,15 +272,15 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     fn shade<'h, const N: usize>(
         &mut self,
         active: u16,
+        nodes: &[Node; N],
         hit: impl Fn(usize) -> Option<&'h Hit>,
-        node: impl Fn(usize) -> Node,
     ) {
         let scene = self.scene;
         let mut hits = Hits::<F, N>::none();
         for lane in (0..N).filter(|lane| active >> lane & 1 == 1) {
-            let node = node(lane);
+            let node = &nodes[lane];
             let hit = hit(lane);
-            let weight = self.through_media(&node, hit.map_or(f32::INFINITY, |hit| hit.t));
+            let weight = self.through_media(node, hit.map_or(f32::INFINITY, |hit| hit.t));
             let Some(hit) = hit else {
                 self.counts.ends.miss += 1;
                 self.radiance[node.lane as usize] += weight * scene.background;
@@ -306,26 +302,25 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
                 self.radiance[node.lane as usize] += weight * material.ambient() * scene.ambient;
             }
         }
-        self.light(&hits, &node);
+        self.light(&hits, nodes);
         if F::TREE && self.max_depth.is_some() {
-            self.scatter(&hits, &node);
+            self.scatter(&hits, nodes);
         }
     }
 
-    /// What is left of the light of each camera ray on its way through fog from the scene to a far
-    /// camera, where rays do not start at it; the fog's own light is added to the pixels.
-    fn before_the_scene(&mut self, node: &impl Fn(usize) -> Node) -> [Rgb; LANES] {
-        std::array::from_fn(|lane| {
-            let is_active = self.camera.rays.active() >> lane & 1 == 1;
-            let node = node(lane);
-            if !is_active || node.before <= 0.0 {
-                return Rgb::splat(1.0);
+    /// Takes from each camera ray what fog takes of its light between the scene and a far camera, where
+    /// rays do not start at it; the fog's own light is added to the pixels.
+    fn before_the_scene(&mut self, nodes: &mut [Node; LANES]) {
+        for lane in self.camera.rays.lanes() {
+            let node = &mut nodes[lane];
+            if node.before <= 0.0 {
+                continue;
             }
             let (o, d) = (node.ray.origin.as_dvec3(), node.ray.direction.as_dvec3());
             let start = (o - d * f64::from(node.before)).as_vec3();
             let ray = Ray::new(start, node.ray.direction);
-            self.through_media(&Node { ray, before: 0.0, ..node }, node.before)
-        })
+            node.throughput = self.through_media(&Node { ray, before: 0.0, ..*node }, node.before);
+        }
     }
 
     /// The throughput of a ray after `distance`, in the media that it runs through; fog's own light is
@@ -337,8 +332,8 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             return self.through_volumes(node, distance);
         }
         if F::TREE && !node.interior.is_outside() {
-            if let Some(medium) = self.scene.medium(node.interior)
-                && !medium.absorption.is_black()
+            if self.scene.requirements.absorbing > 0
+                && let Some(medium) = self.scene.medium(node.interior)
             {
                 throughput *= beer_lambert(medium.absorption, distance);
             }

@@ -8,11 +8,11 @@ use crate::accel::{LANES, RayBlock, RayQuery};
 use crate::color::{Rgb, Wavelength};
 use crate::material::{Dielectric, FresnelModel, Material, fresnel};
 use crate::medium::Interior;
-use crate::sampler::Dimensions;
-use crate::scene::SurfacePoint;
+use crate::sampler::{Dimensions, Sampler};
+use crate::scene::{Cone, SurfacePoint};
 
 /// Surfaces between equal media that a ray passes at most.
-const MAX_PASSED: u32 = 1 << 12;
+const MAX_PASSED: u16 = 1 << 12;
 
 /// Fewer rays than this are traced one by one.
 const MIN_PACKET: usize = 6;
@@ -30,17 +30,36 @@ pub(super) enum Way {
     Refracted,
 }
 
+/// A hit from which rays go on.
+struct Fork<'a> {
+    /// The ray that hit.
+    node: &'a Node,
+    point: &'a SurfacePoint<'a>,
+    /// Unit normal on the ray's side.
+    n: Vec3,
+    /// What light that leaves the surface towards the ray counts for in the pixel.
+    throughput: Rgb,
+    /// How wide the ray is there.
+    cone: Cone,
+}
+
+/// A ray that is to go on from a hit.
+struct Branch {
+    direction: Vec3,
+    throughput: Rgb,
+    interior: Interior,
+    way: Way,
+    cone: Cone,
+    wavelength: f32,
+}
+
 impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Sends the rays of all specular hits on: they wait on the stack, but for those of a block that
     /// run close together, which are traced as one.
     #[inline]
-    pub(super) fn scatter<const N: usize>(
-        &mut self,
-        hits: &Hits<'_, F, N>,
-        node: &impl Fn(usize) -> Node,
-    ) {
+    pub(super) fn scatter<const N: usize>(&mut self, hits: &Hits<'_, F, N>, nodes: &[Node; N]) {
         let before = self.stack.len();
-        for lane in 0..N {
+        for (lane, node) in nodes.iter().enumerate() {
             self.children(hits, node, lane);
         }
         if N == LANES && self.stack.len() - before >= MIN_PACKET {
@@ -72,72 +91,62 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
 
     /// The rays that go on from the hit of a lane; none where it has no hit or sends no rays on.
     #[inline]
-    fn children<const N: usize>(
-        &mut self,
-        hits: &Hits<'_, F, N>,
-        node: &impl Fn(usize) -> Node,
-        lane: usize,
-    ) {
+    fn children<const N: usize>(&mut self, hits: &Hits<'_, F, N>, node: &Node, lane: usize) {
         let Some((point, material)) = hits.get(lane) else { return };
         if !material.is_specular() {
             self.counts.ends.diffuse += 1;
             return;
         }
-        let parent =
-            Node { throughput: hits.weights[lane], cone: hits.textured.cone(lane), ..node(lane) };
-        let d = parent.ray.direction;
+        let d = node.ray.direction;
         // A shading normal that faces away from the ray says nothing of its mirror image.
         let n = if point.normal.dot(d) < 0.0 { point.normal } else { point.geometric_normal };
+        let (throughput, cone) = (hits.weights[lane], hits.textured.cone(lane));
+        let fork = Fork { node, point, n, throughput, cone };
         if let Material::Dielectric(glass) = material {
-            self.through_surface(&parent, point, n, glass);
+            self.through_surface(&fork, glass);
             return;
         }
-        let weight = parent.throughput * material.mirrored(-d.dot(n));
-        self.mirrored(&parent, point, n, weight);
+        self.mirrored(&fork, throughput * material.mirrored(-d.dot(n)), node.wavelength);
     }
 
     /// The ray that a surface mirrors.
-    #[inline]
-    fn mirrored(&mut self, parent: &Node, point: &SurfacePoint<'_>, n: Vec3, weight: Rgb) {
-        let d = parent.ray.direction;
-        let mut direction = fresnel::reflect(d, n);
+    #[inline(always)]
+    fn mirrored(&mut self, fork: &Fork<'_>, throughput: Rgb, wavelength: f32) {
+        let d = fork.node.ray.direction;
+        let mut direction = fresnel::reflect(d, fork.n);
         // An interpolated or mapped normal may send it into the surface.
-        if direction.dot(point.geometric_normal) <= 0.0 {
-            direction = fresnel::reflect(d, point.geometric_normal);
+        if direction.dot(fork.point.geometric_normal) <= 0.0 {
+            direction = fresnel::reflect(d, fork.point.geometric_normal);
         }
-        let parent = Node { cone: parent.cone.turned(2.0), ..*parent };
-        self.child(&parent, point, direction, weight, parent.interior, Way::Mirrored);
+        let (interior, way) = (fork.node.interior, Way::Mirrored);
+        let cone = fork.cone.turned(2.0);
+        self.child(fork, Branch { direction, throughput, interior, way, cone, wavelength });
     }
 
     /// The two rays of a surface between two media: of glass and air, of two glasses, or of one
     /// that another of higher priority fills, where the ray passes straight.
     #[inline]
-    fn through_surface(
-        &mut self,
-        parent: &Node,
-        point: &SurfacePoint<'_>,
-        n: Vec3,
-        glass: &Dielectric,
-    ) {
+    fn through_surface(&mut self, fork: &Fork<'_>, glass: &Dielectric) {
         let scene = self.scene;
-        let d = parent.ray.direction;
-        let crossing = scene.crossing(parent.interior, point.material_index, point.is_front);
+        let &Fork { node, point, n, .. } = fork;
+        let d = node.ray.direction;
+        let crossing = scene.crossing(node.interior, point.material_index, point.is_front);
         if crossing.is_same() {
-            self.passing(parent, point, crossing.beyond);
+            self.passing(fork, crossing.beyond);
             return;
         }
         // Where media disperse, a ray carries one wavelength from here on.
-        let splits = F::EVERYTHING && parent.wavelength == 0.0 && crossing.is_dispersive(scene);
+        let splits = F::EVERYTHING && node.wavelength == 0.0 && crossing.is_dispersive(scene);
         let (wavelength, color) =
-            if splits { self.wavelength(parent) } else { (parent.wavelength, Rgb::splat(1.0)) };
+            if splits { self.wavelength(node) } else { (node.wavelength, Rgb::splat(1.0)) };
         let [n_i, n_t] = crossing.indices(scene, wavelength);
         if n_i == n_t && !splits && !matches!(glass.fresnel, FresnelModel::Power(_)) {
             // Other media, perhaps with other absorption, but light takes no notice of the surface.
-            self.passing(parent, point, crossing.beyond);
+            self.passing(fork, crossing.beyond);
             return;
         }
         let bent = fresnel::refract(d, n, n_t / n_i);
-        let one = Node { wavelength, throughput: parent.throughput * color, ..*parent };
+        let of_one = fork.throughput * color;
 
         // But where it enters the denser medium nothing is reflected totally: the mirrored ray goes on
         // with all wavelengths, by the share of the mean index, and the other has the rest.
@@ -149,8 +158,11 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             None => 1.0,
             Some(bent) => glass.fresnel.dielectric(bent.cos_i, bent.cos_t, f_i, f_t),
         };
-        let from = if keeps_all { parent } else { &one };
-        self.mirrored(from, point, n, from.throughput * reflected);
+        if keeps_all {
+            self.mirrored(fork, fork.throughput * reflected, node.wavelength);
+        } else {
+            self.mirrored(fork, of_one * reflected, wavelength);
+        }
         let Some(bent) = bent else { return };
 
         let mut direction = bent.direction;
@@ -159,23 +171,26 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             direction = fresnel::refract(d, point.geometric_normal, n_t / n_i)
                 .map_or(d, |bent| bent.direction);
         }
-        let share = one.throughput * (1.0 - reflected);
-        let one = Node { cone: one.cone.turned((1.0 - n_i / n_t).abs()), ..one };
-        self.child(&one, point, direction, share, crossing.beyond, Way::Refracted);
+        let throughput = of_one * (1.0 - reflected);
+        let (interior, way) = (crossing.beyond, Way::Refracted);
+        let cone = fork.cone.turned((1.0 - n_i / n_t).abs());
+        self.child(fork, Branch { direction, throughput, interior, way, cone, wavelength });
     }
 
     /// The ray that goes straight on, through a surface that is none.
-    fn passing(&mut self, parent: &Node, point: &SurfacePoint<'_>, beyond: Interior) {
-        if parent.passed == MAX_PASSED {
+    fn passing(&mut self, fork: &Fork<'_>, beyond: Interior) {
+        let &Fork { node, point, throughput, .. } = fork;
+        if node.passed == MAX_PASSED {
             self.counts.ends.depth += 1;
             return;
         }
         self.counts.refraction += 1;
-        let ray = self.scene.spawn(point, parent.ray.direction, f32::INFINITY);
-        let (passed, way) = (parent.passed + 1, Way::Refracted);
-        let cone = parent.cone.turned(0.0);
-        let before = parent.before + (point.position - parent.ray.origin).length();
-        self.stack.push(Node { ray, interior: beyond, passed, way, cone, before, ..*parent });
+        let ray = self.scene.spawn(point, node.ray.direction, f32::INFINITY);
+        let (passed, way) = (node.passed + 1, Way::Refracted);
+        let cone = fork.cone.turned(0.0);
+        let before = node.before + (point.position - node.ray.origin).length();
+        let interior = beyond;
+        self.stack.push(Node { ray, throughput, interior, passed, way, cone, before, ..*node });
     }
 
     /// The one wavelength of a sample, in nm, and the colour that it counts for.
@@ -189,38 +204,44 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         (wavelength.nanometres(), wavelength.rgb_weight())
     }
 
+    /// Whether a branch of little weight goes on: with the probability `survival`, in proportion to its
+    /// weight, as it then stands for those that ended.
+    #[cold]
+    fn survives(&mut self, sampler: &Sampler, survival: f32) -> bool {
+        let [u, ..] = sampler.four(Dimensions::Roulette);
+        let goes_on = u < survival;
+        self.counts.ends.roulette += u64::from(!goes_on);
+        goes_on
+    }
+
     /// Puts the next ray of a branch on the stack, if none of the rules ends it.
-    #[inline]
-    fn child(
-        &mut self,
-        parent: &Node,
-        point: &SurfacePoint<'_>,
-        direction: Vec3,
-        mut throughput: Rgb,
-        interior: Interior,
-        way: Way,
-    ) {
+    #[inline(always)]
+    fn child(&mut self, fork: &Fork<'_>, branch: Branch) {
         let settings = &self.scene.settings;
+        let node = fork.node;
+        let Branch { direction, mut throughput, interior, way, cone, wavelength } = branch;
         let weight = throughput.max_component();
         // What does not count at all was no branch. Also refuses NaN.
         if !(weight > 0.0) {
             return;
         }
-        if parent.depth >= self.max_depth.unwrap_or(0) {
+        if node.depth >= self.max_depth.unwrap_or(0) {
             self.counts.ends.depth += 1;
             return;
         }
-        let sampler = parent.sampler.branch(BRANCHES + way as u32);
+        // Elsewhere nothing is drawn at random beyond the camera.
+        let sampler = if F::EVERYTHING || settings.roulette {
+            node.sampler.branch(BRANCHES + way as u32)
+        } else {
+            node.sampler
+        };
         if weight < settings.prune {
             if !settings.roulette {
                 self.counts.ends.prune += 1;
                 return;
             }
-            // It goes on with a probability in proportion to its weight, and stands for those that ended.
             let survival = weight / settings.prune;
-            let [u, ..] = sampler.four(Dimensions::Roulette);
-            if u >= survival {
-                self.counts.ends.roulette += 1;
+            if !self.survives(&sampler, survival) {
                 return;
             }
             throughput *= 1.0 / survival;
@@ -229,9 +250,19 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             Way::Mirrored => self.counts.reflection += 1,
             Way::Refracted => self.counts.refraction += 1,
         }
-        let ray = self.scene.spawn(point, direction, f32::INFINITY);
-        let depth = parent.depth + 1;
-        let before = 0.0;
-        self.stack.push(Node { ray, throughput, interior, sampler, depth, way, before, ..*parent });
+        let ray = self.scene.spawn(fork.point, direction, f32::INFINITY);
+        self.stack.push(Node {
+            ray,
+            throughput,
+            interior,
+            sampler,
+            cone,
+            wavelength,
+            depth: node.depth + 1,
+            passed: node.passed,
+            lane: node.lane,
+            way,
+            before: 0.0,
+        });
     }
 }

@@ -1,7 +1,7 @@
 //! Shadow rays: what of a light's sample arrives.
 
 use super::{Features, Node, Walk};
-use crate::accel::RayQuery;
+use crate::accel::{RayBlock, RayQuery};
 use crate::color::Rgb;
 use crate::material::{Material, fresnel};
 use crate::math::Ray;
@@ -12,10 +12,20 @@ use crate::scene::Shadows;
 const MAX_SURFACES: u32 = 1 << 12;
 
 impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
-    /// Whether light passes glass on its way to a surface.
+    /// Whether glass dims light on its way to a surface, neither hiding it nor letting all of it pass.
     #[inline]
-    pub(super) fn sees_through(&self) -> bool {
-        F::EVERYTHING && self.scene.requirements.transparent_shadows
+    pub(super) fn is_tinted(&self) -> bool {
+        let requirements = &self.scene.requirements;
+        F::EVERYTHING && requirements.transparent_shadows && !requirements.clear_shadows
+    }
+
+    /// Which shadow rays of a block are blocked, where they are so or not at all.
+    #[inline]
+    pub(super) fn blocked(&self, rays: &RayBlock) -> u16 {
+        if F::TREE && self.scene.requirements.clear_shadows {
+            return self.query.occluded_by_opaque_block(rays);
+        }
+        self.query.occluded_block(rays)
     }
 
     /// The share of light that comes along a shadow ray of `node`'s hit; none where something opaque
@@ -23,10 +33,15 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     #[inline]
     pub(super) fn arrives(&mut self, ray: &Ray, node: &Node) -> Option<Rgb> {
         self.counts.shadow += 1;
-        if self.sees_through() {
+        if self.is_tinted() {
             return self.through_glass(ray, node);
         }
-        (!self.query.occluded(ray)).then_some(Rgb::splat(1.0))
+        let is_blocked = if F::TREE && self.scene.requirements.clear_shadows {
+            self.query.occluded_by_opaque(ray)
+        } else {
+            self.query.occluded(ray)
+        };
+        (!is_blocked).then_some(Rgb::splat(1.0))
     }
 
     /// The share of light that passes all glass along a straight shadow ray: dimmed by absorption, and
