@@ -1,4 +1,4 @@
-//! Writes the grids of the scenes that show volumetric data, as `.npy` files of 64³ floats: the density of
+//! Writes the grids of the scenes that show volumetric data, as `.npy` files of 40³ floats: the density of
 //! an electron in the 3d state of hydrogen with magnetic quantum number 0, and a puff of smoke.
 //!
 //! ```text
@@ -11,7 +11,7 @@ use std::io::Write;
 use glam::DVec3;
 
 /// Samples along each axis.
-const N: usize = 64;
+const N: usize = 40;
 
 /// |ψ|² of the state (3, 2, 0), relative to its greatest value, over a box of 40 Bohr radii; its axis is
 /// +Y: ψ ∝ r²·exp(−r/3)·(3 cos²θ − 1).

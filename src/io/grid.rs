@@ -3,7 +3,7 @@
 //! Source: NumPy Enhancement Proposal 1, *A Simple File Format for NumPy Arrays*, and
 //! `numpy.lib.format`. An array's axes are x, y and z, in this order, in either memory order.
 
-mod npy;
+pub(super) mod npy;
 
 use std::path::Path;
 
@@ -103,8 +103,12 @@ pub struct SampleLayout {
 /// not finite (as an f32).
 pub fn read_npy(path: &Path) -> Result<Grid, ReadError> {
     let source = Source::open(path)?;
-    let (layout, start) = npy::header(&source)?;
-    read_samples(&source, &layout, start)
+    let npy::Header { shape, kind, is_big_endian, order, start } = npy::header(&source)?;
+    let size: [usize; 3] = shape.try_into().map_err(|shape: Vec<_>| {
+        let message = format!("an array of {} axes; accepted: 3 (x, y, z)", shape.len());
+        ReadError::file(path, message)
+    })?;
+    read_samples(&source, &SampleLayout { size, kind, is_big_endian, order }, start)
 }
 
 /// Reads a file of nothing but samples.

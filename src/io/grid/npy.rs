@@ -1,7 +1,7 @@
 //! The header of a `.npy` file: a Python dictionary of three entries, after some bytes that tell how long
 //! it is.
 
-use super::{SampleLayout, SampleType};
+use super::SampleType;
 use crate::geometry::grid::SampleOrder;
 use crate::io::error::ReadError;
 use crate::io::source::Source;
@@ -11,8 +11,23 @@ const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// A header says three things; NumPy itself refuses longer ones.
 const MOST: u64 = 10_000;
 
-/// Reads the header: the layout of the samples, and where they start.
-pub(super) fn header(source: &Source<'_>) -> Result<(SampleLayout, u64), ReadError> {
+/// What a header says of the array.
+#[derive(Debug)]
+pub(in crate::io) struct Header {
+    /// Its length along each axis.
+    pub shape: Vec<usize>,
+    /// The type of its samples.
+    pub kind: SampleType,
+    /// Whether the most significant byte comes first.
+    pub is_big_endian: bool,
+    /// Which axis runs fastest: the first, or the last.
+    pub order: SampleOrder,
+    /// Where in the file the samples start.
+    pub start: u64,
+}
+
+/// Reads the header.
+pub(in crate::io) fn header(source: &Source<'_>) -> Result<Header, ReadError> {
     let at = |offset, message: &str| ReadError::byte(source.path, offset, message);
     let mut start = [0; 12];
     let known = source.len.min(12) as usize;
@@ -37,8 +52,8 @@ pub(super) fn header(source: &Source<'_>) -> Result<(SampleLayout, u64), ReadErr
     let mut text = vec![0; length as usize];
     source.read_at(&mut text, begin)?;
     let mut parser = Parser { text: &text, at: 0 };
-    let layout = parser.layout().map_err(|message| at(begin + parser.at as u64, &message))?;
-    Ok((layout, begin + length))
+    let header = parser.header().map_err(|message| at(begin + parser.at as u64, &message))?;
+    Ok(Header { start: begin + length, ..header })
 }
 
 /// Reads a Python literal of the few forms that occur.
@@ -49,8 +64,8 @@ struct Parser<'t> {
 
 impl<'t> Parser<'t> {
     /// `{'descr': '<f4', 'fortran_order': False, 'shape': (64, 64, 64), }`, in any order.
-    fn layout(&mut self) -> Result<SampleLayout, String> {
-        let (mut kind, mut order, mut size) = (None, None, None);
+    fn header(&mut self) -> Result<Header, String> {
+        let (mut kind, mut order, mut shape) = (None, None, None);
         self.expect(b'{')?;
         while !self.skip(b'}') {
             let (name, from) = (self.quoted()?, self.at);
@@ -58,7 +73,7 @@ impl<'t> Parser<'t> {
             match name {
                 b"descr" => kind = Some(self.kind()?),
                 b"fortran_order" => order = Some(self.order()?),
-                b"shape" => size = Some(self.size()?),
+                b"shape" => shape = Some(self.shape()?),
                 _ => {
                     self.at = from;
                     let name = String::from_utf8_lossy(name);
@@ -70,10 +85,10 @@ impl<'t> Parser<'t> {
                 break;
             }
         }
-        let (Some((kind, is_big_endian)), Some(order), Some(size)) = (kind, order, size) else {
+        let (Some((kind, is_big_endian)), Some(order), Some(shape)) = (kind, order, shape) else {
             return Err("the header lacks one of 'descr', 'fortran_order', 'shape'".to_owned());
         };
-        Ok(SampleLayout { size, kind, is_big_endian, order })
+        Ok(Header { shape, kind, is_big_endian, order, start: 0 })
     }
 
     /// Skips blanks, then `byte` if it is there.
@@ -153,24 +168,19 @@ impl<'t> Parser<'t> {
         }
     }
 
-    fn size(&mut self) -> Result<[usize; 3], String> {
+    fn shape(&mut self) -> Result<Vec<usize>, String> {
         self.expect(b'(')?;
-        let from = self.at;
-        let mut size = Vec::new();
+        let mut shape = Vec::new();
         while !self.skip(b')') {
             let digits = self.word(u8::is_ascii_digit);
             let number = str::from_utf8(digits).ok().and_then(|text| text.parse().ok());
-            size.push(number.ok_or("'shape' must be whole numbers")?);
+            shape.push(number.ok_or("'shape' must be whole numbers")?);
             if !self.skip(b',') {
                 self.expect(b')')?;
                 break;
             }
         }
-        let axes = size.len();
-        <[usize; 3]>::try_from(size).map_err(|_| {
-            self.at = from;
-            format!("an array of {axes} axes; accepted: 3 (x, y, z)")
-        })
+        Ok(shape)
     }
 }
 
