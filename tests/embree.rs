@@ -359,3 +359,41 @@ fn a_scene_is_traced_from_many_threads() {
         }
     });
 }
+
+/// Embree's own spheres against the closed form, for what they are measured beside.
+#[test]
+fn sphere_points_are_spheres() {
+    let device = device();
+    let mut random = Random(8);
+    let spheres: Vec<[f32; 4]> = (0..200)
+        .map(|_| {
+            let c = random.in_cube() * 4.0;
+            c.extend(random.between(0.1, 0.5)).as_vec4().to_array()
+        })
+        .collect();
+    let geometry = Geometry::sphere_points(&device, Arc::new(spheres.clone())).unwrap();
+    let scene = scene(&device, [geometry]);
+    let mut hits = 0;
+    for _ in 0..5000 {
+        let (o, d) = (random.in_cube() * 6.0, random.direction());
+        let ray = Ray::new(o.as_vec3().to_array(), d.as_vec3().to_array());
+        let expected = spheres
+            .iter()
+            .filter_map(|&[x, y, z, r]| {
+                let l = glam::DVec3::new(x.into(), y.into(), z.into()) - o;
+                let (b, r) = (l.dot(d), f64::from(r));
+                let disc = r * r - (l - d * b).length_squared();
+                // Neither grazing nor from close by: that is f32's.
+                let root = disc.max(0.0).sqrt();
+                [b - root, b + root].into_iter().find(|t| disc > 0.0 && *t > 0.0)
+            })
+            .fold(f64::INFINITY, f64::min);
+        match scene.intersect(&ray) {
+            Some(hit) if (f64::from(hit.t) - expected).abs() < 1e-3 => hits += 1,
+            None if expected.is_infinite() => {}
+            // A ray that grazes one may fall either way.
+            _ => hits -= 20,
+        }
+    }
+    assert!(hits > 500, "{hits}");
+}

@@ -124,7 +124,8 @@ fn every_scene_renders_to_a_picture() {
     let mut all = common::files(&scenes().join("lecture"), &["toml"]);
     assert!(all.len() >= 15);
     all.extend(
-        ["glass", "prism", "marbles"].map(|name| scenes().join(name).with_extension("toml")),
+        ["glass", "prism", "marbles", "primitives", "teapot"]
+            .map(|name| scenes().join(name).with_extension("toml")),
     );
     for path in all {
         let mut desc = load(&path);

@@ -9,9 +9,12 @@
 mod common;
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
+use alhazen::geometry::grid::Grid;
 use alhazen::geometry::{
-    AnalyticShape, Cone, Cuboid, Disk, Framed, Plane, Polygon, Quadric, Sphere, Torus,
+    AnalyticShape, Cone, Cuboid, Disk, Expression, Framed, Implicit, Isosurface, Plane, Polygon,
+    Quadric, Sphere, Torus,
 };
 use alhazen::math::Bounds;
 use common::Random;
@@ -402,6 +405,45 @@ fn survey(rays: u32) -> Vec<(&'static str, [Worst; 4])> {
         };
         rows.push((name, DISTANCES.map(|distance| case.check(random, distance, rays))));
     }
+    let expression = Expression::parse("(sqrt(x^2 + z^2) - 1)^2 + y^2 - 0.16").expect("it is one");
+    let bounds = Bounds { min: DVec3::new(-1.5, -0.5, -1.5), max: DVec3::new(1.5, 0.5, 1.5) };
+    case!(
+        "implicit torus",
+        Implicit::new(Arc::new(expression), bounds),
+        DVec3::ZERO,
+        1.4,
+        |p: DVec3| (p.x.hypot(p.z) - 1.0).hypot(p.y) - 0.4,
+        everywhere
+    );
+    // A ball of samples, and what lies between them from the eight around.
+    let sample = |i: usize, j: usize, k: usize| {
+        let p = DVec3::new(i as f64, j as f64, k as f64) - 4.0;
+        (2.9 - p.length() + 0.3 * (2.0 * p.x).sin()) as f32
+    };
+    let grid = Arc::new(Grid::from_fn([9; 3], sample).expect("finite"));
+    let between = |p: DVec3| {
+        let p = (p + 4.0).clamp(DVec3::ZERO, DVec3::splat(8.0));
+        let cell = p.floor().min(DVec3::splat(7.0));
+        let (f, [i, j, k]) = (p - cell, cell.to_array().map(|x| x as usize));
+        let corner = |c: usize| {
+            let [x, y, z] = [c & 1, c >> 1 & 1, c >> 2];
+            let weight = |step: usize, f: f64| if step == 1 { f } else { 1.0 - f };
+            weight(x, f.x)
+                * weight(y, f.y)
+                * weight(z, f.z)
+                * f64::from(sample(i + x, j + y, k + z))
+        };
+        -(0..8).map(corner).sum::<f64>()
+    };
+    let bounds = Bounds { min: DVec3::splat(-4.0), max: DVec3::splat(4.0) };
+    case!(
+        "isosurface",
+        Isosurface::new(grid, bounds, 0.0, false),
+        DVec3::ZERO,
+        3.4,
+        between,
+        everywhere
+    );
     rows
 }
 

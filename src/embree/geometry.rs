@@ -109,6 +109,39 @@ impl Geometry {
         geometry.commit("set up a triangle mesh")
     }
 
+    /// Embree's own spheres, over a buffer that is shared, not copied: centre and radius each, solved in
+    /// f32. Not what scenes are made of, but what our own are measured against.
+    ///
+    /// # Errors
+    /// [`EmbreeError::Size`] beyond 2³² − 1 spheres.
+    pub fn sphere_points(
+        device: &Device,
+        spheres: Arc<Vec<[f32; 4]>>,
+    ) -> Result<Self, EmbreeError> {
+        if u32::try_from(spheres.len()).is_err() {
+            let expected = "fewer than 2^32 items".to_owned();
+            return Err(EmbreeError::Size { what: "sphere buffer", expected, got: spheres.len() });
+        }
+        let mut geometry = Self::new(device, sys::RTC_GEOMETRY_TYPE_SPHERE_POINT)?;
+        // SAFETY: the buffer is kept by the geometry, from whose `_keep` no `&mut` is ever taken; other
+        // owners of the Arc share it with it, so nobody can move or change it. An item has 16 bytes, so
+        // nothing is read past the last.
+        unsafe {
+            sys::rtcSetSharedGeometryBuffer(
+                geometry.raw(),
+                sys::RTC_BUFFER_TYPE_VERTEX,
+                0,
+                sys::RTC_FORMAT_FLOAT4,
+                spheres.as_ptr().cast(),
+                0,
+                16,
+                spheres.len(),
+            );
+        }
+        geometry._keep = vec![spheres];
+        geometry.commit("set up sphere points")
+    }
+
     /// Shapes that Rust intersects: one box each, and the code behind them.
     ///
     /// # Errors
