@@ -1,8 +1,9 @@
 //! Both renders of a twin, and how far apart they are.
 
+#[path = "program.rs"]
+mod program;
+
 use std::path::Path;
-use std::process::Command;
-use std::sync::LazyLock;
 
 use alhazen::accel::AccelKind;
 use alhazen::color::Rgb;
@@ -13,18 +14,9 @@ use alhazen::render::{RenderJob, render};
 use alhazen::scene::Scene;
 
 use crate::twin::Twin;
+use program::pictures;
 
-/// Whether there is a POV-Ray. Where it is missing, one line says that the tests did not run.
-pub fn povray() -> bool {
-    static FOUND: LazyLock<bool> = LazyLock::new(|| {
-        let found = Command::new("povray").arg("--version").output().is_ok();
-        if !found {
-            eprintln!("not run: no povray; `scripts/setup.sh test` installs it");
-        }
-        found
-    });
-    *FOUND
-}
+pub use program::povray;
 
 pub fn ours(twin: &Twin) -> Picture {
     let scene = Scene::build_quietly(twin.ours(), AccelKind::default());
@@ -34,43 +26,10 @@ pub fn ours(twin: &Twin) -> Picture {
     rendered.film.into()
 }
 
-/// POV-Ray's picture without its antialiasing, which is adaptive: larger, and averaged down. Each
-/// sample is in [0, 1] with 16 bits, in linear light.
+/// POV-Ray's picture without its antialiasing, which is adaptive: larger, and averaged down.
 pub fn theirs(twin: &Twin) -> Picture {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("scene.pov"), twin.theirs()).unwrap();
-    let [w, h] = twin.size.map(|side| side * twin.pixels);
-    let (width, height) = (format!("+W{w}"), format!("+H{h}"));
-    let output = Command::new("povray")
-        .args([
-            "+Iscene.pov",
-            "+Oscene.ppm",
-            "+FP16",
-            "File_Gamma=1.0",
-            "-A",
-            "-D",
-            &width,
-            &height,
-        ])
-        .current_dir(folder.path())
-        .output()
-        .expect("povray starts");
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{stderr}\n{}", twin.theirs());
-    averaged(&read_ppm(&folder.path().join("scene.ppm"), [w, h]), twin)
-}
-
-/// The values of a binary PPM file of this size and 16 bits.
-fn read_ppm(path: &Path, [w, h]: [u32; 2]) -> Vec<Rgb> {
-    let bytes = std::fs::read(path).unwrap();
-    // The header is text of any length; the pixels are what is at the end.
-    let size = 6 * w as usize * h as usize;
-    assert!(bytes.starts_with(b"P6") && bytes.len() > size, "{}", path.display());
-    let (header, pixels) = bytes.split_at(bytes.len() - size);
-    let header = String::from_utf8_lossy(header);
-    assert!(header.trim_end().ends_with(&format!("{w} {h}\n65535")), "{header}");
-    let value = |b: &[u8]| f32::from(u16::from_be_bytes([b[0], b[1]])) / 65535.0;
-    pixels.chunks_exact(6).map(|p| Rgb::new(value(p), value(&p[2..]), value(&p[4..]))).collect()
+    let size = twin.size.map(|side| side * twin.pixels);
+    averaged(&pictures(&twin.theirs(), size, 1)[0], twin)
 }
 
 fn averaged(pixels: &[Rgb], twin: &Twin) -> Picture {
