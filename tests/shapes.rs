@@ -528,3 +528,33 @@ fn polygons_that_share_edges_leave_no_gap() {
     }
     assert!(crossed > 60_000, "{crossed}");
 }
+
+/// Rays aimed at the edges and corners of closed shapes, a billionth of the size within them: what lies there
+/// is solid, so that one which passes has slipped through between two faces.
+#[test]
+fn no_ray_slips_through_an_edge() {
+    let random = &mut Random(17);
+    let bounds = Bounds { min: DVec3::new(-1.0, 0.2, 3.0), max: DVec3::new(0.5, 0.9, 3.4) };
+    let cone = Cone { height: 0.7, radii: [0.6, 0.25], has_caps: true };
+    let mut lost = [0; 2];
+    for _ in 0..if common::verify() { 2_000_000 } else { 100_000 } {
+        let origin = random.direction() * 10f64.powf(random.between(1.0, 3.0));
+        // A point of an edge: two coordinates at an end, the third anywhere, a corner one time in four.
+        let mut at = DVec3::new(random.unit(), random.unit(), random.unit());
+        let free = if random.unit() < 0.25 { 3 } else { random.below(3) };
+        (0..3).filter(|axis| *axis != free).for_each(|axis| at[axis] = at[axis].round());
+        let edge = bounds.min + at * bounds.size();
+        let target = edge + (bounds.center() - edge) * 1e-9;
+        let ray = (origin, target - origin);
+        let cuboid = Cuboid { bounds };
+        lost[0] += u32::from(!cuboid.occluded(ray.0, ray.1, 0.0, f64::INFINITY));
+
+        let (sin, cos) = (random.unit() * TAU).sin_cos();
+        let (rho, y) = if random.unit() < 0.5 { (0.6, 0.0) } else { (0.25, 0.7) };
+        let rim = DVec3::new(rho * sin, y, rho * cos);
+        let target = rim + (DVec3::Y * 0.3 - rim) * 1e-9;
+        let ray = (origin, target - origin);
+        lost[1] += u32::from(!cone.occluded(ray.0, ray.1, 0.0, f64::INFINITY));
+    }
+    assert_eq!(lost, [0, 0]);
+}
