@@ -70,7 +70,7 @@ impl AnalyticShape for Sphere {
         ShapePoint { position: self.center + normal * self.radius, normal }
     }
 
-    /// Longitude and latitude, as [`globe`] has them.
+    /// Longitude and latitude, as `globe` has them.
     fn parameters(&self, p: DVec3, _part: u8) -> Parameters {
         globe(p - self.center)
     }

@@ -55,6 +55,15 @@ impl BezierPatch {
         Bounds::of(self.control.iter().map(|c| project(*c)))
     }
 
+    /// Upper bounds of how long its lines are along u and along v: the longest of its control polygons.
+    pub(super) fn lengths(&self) -> [f64; 2] {
+        let [p, q] = self.degree;
+        let at = |i: usize, j: usize| project(self.control[j * (p + 1) + i]);
+        let row = |j| (0..p).map(|i| at(i, j).distance(at(i + 1, j))).sum::<f64>();
+        let column = |i| (0..q).map(|j| at(i, j).distance(at(i, j + 1))).sum::<f64>();
+        [(0..=q).map(row).fold(0.0, f64::max), (0..=p).map(column).fold(0.0, f64::max)]
+    }
+
     /// Texture coordinates at (u, v).
     pub(super) fn uv(&self, u: f64, v: f64) -> DVec2 {
         self.uv[0] + (self.uv[1] - self.uv[0]) * DVec2::new(u, v)

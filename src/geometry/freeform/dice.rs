@@ -32,6 +32,7 @@ pub(super) fn dice(
         .par_iter()
         .map(|patch| Need {
             second: patch.second_derivatives(),
+            lengths: patch.lengths(),
             tolerance: tolerance(&patch.bounds()),
         })
         .collect();
@@ -59,8 +60,13 @@ pub(super) fn dice(
 struct Need {
     /// Bounds of |S_uu|, |S_uv|, |S_vv|.
     second: [f64; 3],
+    /// Lengths along u and v.
+    lengths: [f64; 2],
     tolerance: f64,
 }
+
+/// Cells this many times as long as wide count double.
+const LONG: f64 = 256.0;
 
 impl Need {
     /// The least number of cells along u and v, as whole numbers, if each tolerance is `factor` times
@@ -81,10 +87,21 @@ impl Need {
         let ideal = if ideal.is_finite() { ideal.ceil().max(1.0) } else { 1.0 };
         // 0 / 0 where nothing bends: one cell.
         let least = (m_vv / allowed).sqrt().floor() + 1.0;
-        let rows =
-            [1.0, least, ideal - 1.0, ideal, ideal + 1.0].into_iter().filter(|&n| n >= least);
+        // Where twist alone decides, any m × n of the same product will do: then square cells.
+        let [length_u, length_v] = self.lengths;
+        let square = (2.0 * m_uv / allowed * (length_v / length_u)).sqrt();
+        let square = if square.is_finite() { square.ceil().max(least) } else { least };
+        let rows = [1.0, least, ideal - 1.0, ideal, ideal + 1.0, square];
+        let rows = rows.into_iter().filter(|&n| n >= least);
         let rows = rows.map(|n| [cells(along_u(1.0 / n)), n]);
-        let better = |a: [f64; 2], b: [f64; 2]| if b[0] * b[1] < a[0] * a[1] { b } else { a };
+        // Slivers are hit at places that are off by more than 32 bits say.
+        let cost = |[m, n]: [f64; 2]| {
+            let aspect = (length_u * n) / (length_v * m);
+            let aspect = aspect.max(aspect.recip());
+            let aspect = if aspect.is_finite() { aspect } else { 1.0 };
+            m * n * (1.0 + aspect / LONG)
+        };
+        let better = |a: [f64; 2], b: [f64; 2]| if cost(b) < cost(a) { b } else { a };
         rows.reduce(better).unwrap_or([1.0, 1.0])
     }
 }
@@ -254,7 +271,7 @@ mod tests {
             [0.0, 0.0, 0.0],
         ] {
             for tolerance in [1.0, 0.1, 1e-3, 1e-5] {
-                let [m, n] = Need { second, tolerance }.cells(1.0);
+                let [m, n] = Need { second, lengths: [1.0, 1.0], tolerance }.cells(1.0);
                 let off = |m: f64, n: f64| {
                     let [uu, uv, vv] = second;
                     0.125 * (uu / (m * m) + 2.0 * uv / (m * n) + vv / (n * n))
@@ -275,7 +292,7 @@ mod tests {
 
     #[test]
     fn limits_tell_what_would_fit() {
-        let need = Need { second: [1.0, 1.0, 1.0], tolerance: 1e-9 };
+        let need = Need { second: [1.0, 1.0, 1.0], lengths: [1.0, 1.0], tolerance: 1e-9 };
         let TooManyTriangles { fits, .. } = count_cells(&[need; 10], 1000).unwrap_err();
         let need = Need { tolerance: fits, ..need };
         assert!(count_cells(&[need; 10], 1000).is_ok());

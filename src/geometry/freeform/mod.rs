@@ -1,6 +1,6 @@
 //! Freeform surfaces, and triangles that lie within a tolerance of them.
 //!
-//! Patches, polynomial or rational, become [`BezierPatch`]es and are diced ([`dice`]): a grid on each,
+//! Patches, polynomial or rational, become [`BezierPatch`]es and are diced (`dice`): a grid on each,
 //! as fine as its second derivatives ask for, and the points of an edge that two patches share computed
 //! once. Subdivision surfaces ([`subdivision`]) are refined as meshes until they are near enough.
 //! Everything is f64 until the mesh is made.

@@ -1,8 +1,8 @@
 //! Catmull-Clark subdivision surfaces.
 //!
 //! The mesh is refined as a whole, level by level, until its triangles between limit points are near
-//! enough to the limit surface ([`flatness`]): every vertex is shared, so there are no cracks, and limit
-//! points and normals are exact ([`limit`]). Embree's own subdivision geometry was not taken: it needs
+//! enough to the limit surface (`flatness`): every vertex is shared, so there are no cracks, and limit
+//! points and normals are exact (`limit`). Embree's own subdivision geometry was not taken: it needs
 //! Embree, its hits depend on a tessellation rate and not on a distance, and it would give the pure-Rust
 //! accelerator, lights and normals another surface than the one that Embree traces.
 //!
