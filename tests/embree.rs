@@ -373,7 +373,7 @@ fn sphere_points_are_spheres() {
         .collect();
     let geometry = Geometry::sphere_points(&device, Arc::new(spheres.clone())).unwrap();
     let scene = scene(&device, [geometry]);
-    let mut hits = 0;
+    let (mut hits, mut apart) = (0, 0);
     for _ in 0..5000 {
         let (o, d) = (random.in_cube() * 6.0, random.direction());
         let ray = Ray::new(o.as_vec3().to_array(), d.as_vec3().to_array());
@@ -391,9 +391,9 @@ fn sphere_points_are_spheres() {
         match scene.intersect(&ray) {
             Some(hit) if (f64::from(hit.t) - expected).abs() < 1e-3 => hits += 1,
             None if expected.is_infinite() => {}
-            // A ray that grazes one may fall either way.
-            _ => hits -= 20,
+            _ => apart += 1,
         }
     }
-    assert!(hits > 500, "{hits}");
+    // A ray that grazes one may fall either way.
+    assert!(hits > 800 && apart <= 2, "{hits} as they should be, {apart} not");
 }

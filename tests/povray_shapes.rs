@@ -449,7 +449,7 @@ fn patches() {
         [0.3, 1.0, -0.3],
         [1.2, 1.1, 0.2],
     ];
-    let ours = format!("shape = \"patches\"\npoints = {points:?}\ntolerance = \"0.00001 m\"");
+    let ours = format!("shape = \"patches\"\npoints = {points:?}\ntolerance = \"0.0001 m\"");
     let listed = points.map(|p| format!("<{}>", joined(&p))).join(", ");
     let theirs = format!("bicubic_patch {{ type 1 flatness 0 u_steps 8 v_steps 8 {listed} }}");
     check(&[case("Bézier patch", &ours, &theirs).accept(1e-4, 2e-4)]);

@@ -85,6 +85,11 @@ impl Geometry {
         self.len() == 0
     }
 
+    /// Whether some of it has no end.
+    pub fn is_endless(&self) -> bool {
+        matches!(self, Self::Shapes(shapes) if shapes.is_endless())
+    }
+
     /// The box around all primitives. For a mesh: around the vertices that triangles use.
     pub fn bounds(&self) -> Bounds {
         match self {
@@ -107,7 +112,7 @@ impl World {
 
     /// Whether there is something without end in it.
     pub fn is_endless(&self) -> bool {
-        self.root.geometries.iter().any(|g| !g.is_empty() && !g.bounds().is_finite())
+        self.root.geometries.iter().any(Geometry::is_endless)
     }
 
     /// How far the world reaches in each of four directions: the largest dot product of a point with
@@ -117,7 +122,7 @@ impl World {
         let mut add = |far: [f64; 4]| {
             reach = std::array::from_fn(|i| reach[i].max(far[i]));
         };
-        for geometry in self.root.geometries.iter().filter(|g| g.bounds().is_finite()) {
+        for geometry in self.root.geometries.iter().filter(|g| !g.is_endless()) {
             match geometry {
                 Geometry::Mesh(mesh) => add(mesh.support(directions)),
                 Geometry::Shapes(shapes) => with_shapes!(shapes, list => {

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
+use super::shape::cofactors;
 use super::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
 use crate::math::Bounds;
 
@@ -98,14 +99,9 @@ impl<S: AnalyticShape> AnalyticShape for Framed<S> {
     }
 
     fn sample_at(&self, part: u8, place: DVec2) -> Option<SampledPoint> {
-        let inner = self.shape.sample_at(part, place)?;
-        // An area goes by the cofactors.
         let m = &self.outer_from_inner;
-        let cofactors = self.inner_from_outer.matrix3.transpose() * m.matrix3.determinant().abs();
-        Some(SampledPoint {
-            position: m.transform_point3(inner.position),
-            area: cofactors * inner.area,
-        })
+        let inner = self.shape.sample_at(part, place)?;
+        Some(inner.transformed(m, &cofactors(&m.matrix3)))
     }
 
     fn reach(&self, direction: DVec3) -> f64 {

@@ -29,7 +29,7 @@ pub use mesh::{Positions, TriangleMesh};
 pub use plane::Plane;
 pub use polygon::{NoPolygon, Polygon};
 pub use quadric::Quadric;
-pub use shape::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint};
+pub use shape::{AnalyticShape, Parameters, SampledPoint, ShapeHit, ShapePoint, cofactors};
 pub(crate) use shapes::with_shapes;
 pub use shapes::{PlacedShape, Shapes};
 pub use sphere::Sphere;

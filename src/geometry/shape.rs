@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Debug;
 
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use crate::math::Bounds;
 
@@ -51,6 +51,19 @@ pub struct SampledPoint {
     pub position: DVec3,
     /// The outward normal, as long as the area that a unit of the square becomes there.
     pub area: DVec3,
+}
+
+impl SampledPoint {
+    /// The same under a transform, of which `cofactors` are those of its linear part, by which areas go.
+    #[inline]
+    pub fn transformed(&self, m: &DAffine3, cofactors: &DMat3) -> Self {
+        Self { position: m.transform_point3(self.position), area: *cofactors * self.area }
+    }
+}
+
+/// The cofactors of a matrix that is not singular, outward kept outward where it mirrors.
+pub fn cofactors(m: &DMat3) -> DMat3 {
+    m.inverse().transpose() * m.determinant().abs()
 }
 
 /// A shape that is solved as a whole, in f64, in a space of its own.

@@ -146,6 +146,11 @@ impl Shapes {
         })
     }
 
+    /// Whether any of them has no end.
+    pub fn is_endless(&self) -> bool {
+        matches!(self, Self::Planes(planes) if !planes.is_empty())
+    }
+
     /// All of them moved, without a copy where nothing else holds the list.
     #[must_use]
     pub fn translated(mut self, by: DVec3) -> Self {

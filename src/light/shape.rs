@@ -3,13 +3,13 @@
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::LightSample;
 use super::aim::{aim, lift, scaled};
 use super::bounds::{Cone, LightBounds, strength};
 use crate::color::Rgb;
-use crate::geometry::{AnalyticShape, SampledPoint, Shapes, with_shapes};
+use crate::geometry::{AnalyticShape, SampledPoint, Shapes, cofactors, with_shapes};
 use crate::math::Bounds;
 
 /// An analytic shape of constant radiance, on both sides.
@@ -24,6 +24,7 @@ pub struct ShapeLight {
     index: usize,
     /// World from the list's space.
     place: DAffine3,
+    cofactors: DMat3,
     /// Area of the cells up to and including each: part after part, row after row.
     areas: Arc<[f64]>,
     bounds: Bounds,
@@ -52,7 +53,8 @@ impl ShapeLight {
         });
         let empty = Arc::from([]);
         let shapes = shapes.clone();
-        let mut light = Self { shapes, index, place, areas: empty, bounds, radiance };
+        let cofactors = cofactors(&place.matrix3);
+        let mut light = Self { shapes, index, place, cofactors, areas: empty, bounds, radiance };
         let count = usize::from(parts) * CELLS * CELLS;
         let area = |cell| light.at(cell, DVec2::splat(0.5)).map(|p| p.area.length());
         let areas: Vec<Option<f64>> = (0..count).map(area).collect();
@@ -76,11 +78,7 @@ impl ShapeLight {
         let point = with_shapes!(&self.shapes, list => {
             list[self.index].sample_at(part as u8, place)
         })?;
-        let m = &self.place;
-        // An area goes by the cofactors.
-        let cofactors = m.matrix3.inverse().transpose() * m.matrix3.determinant().abs();
-        let position = m.transform_point3(point.position);
-        Some(SampledPoint { position, area: cofactors * point.area })
+        Some(point.transformed(&self.place, &self.cofactors))
     }
 
     /// Area of one side, m², as the cells have it.
