@@ -41,6 +41,12 @@ impl RayBlock {
         }
     }
 
+    /// Makes lanes active whose rays were written side by side, and others not.
+    #[inline]
+    pub const fn activate(&mut self, lanes: u16) {
+        self.active = lanes;
+    }
+
     /// Puts a ray into a lane and makes it active.
     #[inline]
     pub fn set(&mut self, lane: usize, ray: &Ray) {

@@ -12,6 +12,7 @@ mod world;
 
 use std::fmt;
 
+pub(crate) use block::lanes_of;
 pub use block::{HitBlock, LANES, RayBlock};
 pub use brute::BruteForce;
 #[cfg(feature = "embree")]

@@ -4,9 +4,9 @@
 //! 0.03, and the direction's rounding grows with the distance. So rays start at the scene's box where
 //! the camera is far from it, moved there in f64.
 
-use glam::{DMat4, DVec2, DVec3};
+use glam::{DMat4, DVec2, DVec3, Vec3};
 
-use crate::math::{Bounds, Ray, concentric_disk};
+use crate::math::{Bounds, Ray, Vec3Lanes, concentric_disk};
 
 /// How points are projected.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,15 +130,26 @@ impl Camera {
     /// left corner, x right and y down, pixel centres at ½.
     pub fn ray_f64(&self, film: DVec2) -> (DVec3, DVec3) {
         let pose = &self.pose;
-        let p = (film - 0.5 * self.size) * self.pixel;
         match self.projection {
-            Projection::Perspective { .. } => {
-                (pose.eye, (pose.forward + pose.right * p.x - pose.up * p.y).normalize())
-            }
+            Projection::Perspective { .. } => (pose.eye, self.pinhole_direction(film)),
             Projection::Orthographic { .. } => {
+                let p = self.on_plane(film);
                 (pose.eye + pose.right * p.x - pose.up * p.y, pose.forward)
             }
         }
+    }
+
+    /// A point of the film on the plane at distance 1, or of the parallel picture, from its centre.
+    #[inline(always)]
+    fn on_plane(&self, film: DVec2) -> DVec2 {
+        (film - 0.5 * self.size) * self.pixel
+    }
+
+    /// Unit direction from the eye through a point of the film.
+    #[inline(always)]
+    fn pinhole_direction(&self, film: DVec2) -> DVec3 {
+        let (pose, p) = (&self.pose, self.on_plane(film));
+        (pose.forward + pose.right * p.x - pose.up * p.y).normalize()
     }
 
     /// The ray from a point of the lens, `on_lens` in the unit disk, to where the ray of the pinhole
@@ -193,6 +204,33 @@ impl Camera {
             origin += direction * enter.max(0.0);
         }
         Some(Ray::new(origin.as_vec3(), direction.as_vec3()))
+    }
+
+    /// Whether rays depend on a point of a lens.
+    pub fn has_lens(&self) -> bool {
+        self.lens.is_some()
+    }
+
+    /// What [`Camera::ray`] gives for `N` points of the film, given by axis: the origin of all rays, and
+    /// their directions. None where they do not all start at the eye.
+    #[inline(always)]
+    pub fn pinhole_rays<const N: usize>(
+        &self,
+        x: &[f64; N],
+        y: &[f64; N],
+    ) -> Option<(Vec3, Vec3Lanes<N>)> {
+        let is_pinhole = self.lens.is_none()
+            && self.start.is_none()
+            && matches!(self.projection, Projection::Perspective { .. });
+        if !is_pinhole {
+            return None;
+        }
+        // A loop over lanes, for the compiler to turn into vector instructions.
+        let mut directions = Vec3Lanes::ZERO;
+        for i in 0..N {
+            directions.set(i, self.pinhole_direction(DVec2::new(x[i], y[i])).as_vec3());
+        }
+        Some((self.pose.eye.as_vec3(), directions))
     }
 
     /// A pose that shows all of a scene in a picture of `aspect` (width / height), seen along

@@ -45,31 +45,35 @@ struct Replicate {
 }
 
 impl Replicate {
-    fn push(&mut self, leaf: Node) {
-        let (mut level, mut node) = (0, leaf);
-        self.end += 1;
-        // The new node's position on its level is odd where it completes a pair.
-        while let Some(&(left_level, left)) = self.nodes.last()
-            && left_level == level
-            && ((self.end - 1) >> level) & 1 == 1
-        {
-            self.nodes.pop();
-            let later = std::mem::replace(&mut node, left);
-            node.join(&later);
-            level += 1;
+    /// Adds the next leaf, which `fill` writes; then every pair that it completes becomes one node.
+    fn push(&mut self, fill: impl FnOnce(&mut Node)) {
+        self.nodes.push((0, Node::EMPTY));
+        if let Some((_, leaf)) = self.nodes.last_mut() {
+            fill(leaf);
         }
-        self.nodes.push((level, node));
+        let mut position = self.end;
+        self.end += 1;
+        // A node's position on its level is odd where it completes a pair.
+        while let [.., (left_level, left), (level, node)] = self.nodes.as_mut_slice()
+            && *left_level == *level
+            && position & 1 == 1
+        {
+            left.join(node);
+            *left_level += 1;
+            position >>= 1;
+            self.nodes.pop();
+        }
     }
 
-    /// The sum of all nodes, joined from the last backwards.
-    fn total(&self) -> Node {
+    /// The sum of all nodes, joined from the last backwards; none where there is none.
+    fn total(&self) -> Option<Node> {
         let mut nodes = self.nodes.iter().rev().map(|(_, node)| node);
-        let mut total = *nodes.next().unwrap_or(&Node::EMPTY);
+        let mut total = *nodes.next()?;
         for earlier in nodes {
             let later = std::mem::replace(&mut total, *earlier);
             total.join(&later);
         }
-        total
+        Some(total)
     }
 }
 
@@ -77,12 +81,15 @@ impl Replicate {
 #[derive(Debug)]
 pub struct BlockAccumulator {
     replicates: Vec<Replicate>,
+    /// Sums of the replicates that have any samples, while a block is finished.
+    totals: Vec<Node>,
 }
 
 impl BlockAccumulator {
     /// For samples of which number i belongs to replicate i mod `replicates`.
     pub fn new(replicates: u32) -> Self {
-        Self { replicates: (0..replicates).map(|_| Replicate::default()).collect() }
+        let replicates = (0..replicates).map(|_| Replicate::default()).collect();
+        Self { replicates, totals: Vec::new() }
     }
 
     /// Forgets everything; the next sample is number `first_sample`.
@@ -100,31 +107,29 @@ impl BlockAccumulator {
     /// Lanes that `valid` leaves out count as not sampled. A value that is not finite is left out too;
     /// returned are the lanes where that happened, as bits.
     pub fn add(&mut self, index: u32, valid: u16, radiance: &[Rgb; BLOCK_LANES]) -> u16 {
-        let mut leaf = Node::EMPTY;
         let mut dropped = 0;
-        for (lane, value) in radiance.iter().enumerate() {
-            if valid >> lane & 1 == 0 {
-                continue;
-            }
-            if value.is_finite() {
-                leaf.count[lane] = 1;
-                for (sum, x) in leaf.sum.iter_mut().zip(value.to_array()) {
-                    sum[lane] = f64::from(x);
-                }
-            } else {
-                dropped |= 1 << lane;
-            }
-        }
         let replicates = self.replicates.len() as u32;
         let replicate = &mut self.replicates[(index % replicates) as usize];
         debug_assert_eq!(replicate.end, index / replicates, "samples come in order");
-        replicate.push(leaf);
+        replicate.push(|leaf| {
+            for (lane, value) in radiance.iter().enumerate() {
+                let is_valid = valid >> lane & 1 == 1;
+                let counts = is_valid & value.is_finite();
+                dropped |= u16::from(is_valid & !counts) << lane;
+                leaf.count[lane] = counts.into();
+                for (sum, x) in leaf.sum.iter_mut().zip(value.to_array()) {
+                    sum[lane] = if counts { x.into() } else { 0.0 };
+                }
+            }
+        });
         dropped
     }
 
     /// Mean of every pixel, and the standard error of the mean.
-    pub fn finish(&self, origin: [u32; 2]) -> BlockPixels {
-        let totals: Vec<Node> = self.replicates.iter().map(Replicate::total).collect();
+    pub fn finish(&mut self, origin: [u32; 2]) -> BlockPixels {
+        self.totals.clear();
+        self.totals.extend(self.replicates.iter().filter_map(Replicate::total));
+        let totals = &self.totals;
         let mut pixels = BlockPixels {
             origin,
             mean: [Rgb::BLACK; BLOCK_LANES],
@@ -132,21 +137,23 @@ impl BlockAccumulator {
         };
         // Samples of each pixel, and replicates that have any.
         let (mut n, mut filled) = ([0.0; BLOCK_LANES], [0.0; BLOCK_LANES]);
-        for total in &totals {
+        for total in totals {
             for lane in 0..BLOCK_LANES {
                 n[lane] += f64::from(total.count[lane]);
                 filled[lane] += f64::from(total.count[lane].min(1));
             }
         }
+        // A single replicate shows no error.
+        let shows_error = totals.len() > 1;
         // Channel by channel, all pixels side by side; what was not sampled comes out as NaN.
         let channels: [_; 3] = std::array::from_fn(|c| {
             let (mut mean, mut variance) = ([0.0; BLOCK_LANES], [0.0; BLOCK_LANES]);
-            for total in &totals {
+            for total in totals {
                 mean.iter_mut().zip(&total.sum[c]).for_each(|(mean, sum)| *mean += sum);
             }
             mean.iter_mut().zip(&n).for_each(|(mean, n)| *mean /= n);
             // Weighted by their counts, as the last replicates may be one sample short.
-            for total in &totals {
+            for total in totals.iter().filter(|_| shows_error) {
                 for lane in 0..BLOCK_LANES {
                     let k = f64::from(total.count[lane]);
                     let spread = k * (total.sum[c][lane] / k - mean[lane]).powi(2);
@@ -232,12 +239,12 @@ mod tests {
         // The nodes of [0, 24) are those of [0, 24) cut anywhere: push the same samples, compare shapes.
         let mut whole = Replicate::default();
         for _ in 0..24 {
-            whole.push(Node::EMPTY);
+            whole.push(|_| ());
         }
         assert_eq!(whole.nodes.iter().map(|n| n.0).collect::<Vec<_>>(), [4, 3]);
         let mut late = Replicate { end: 10, ..Replicate::default() };
         for _ in 10..24 {
-            late.push(Node::EMPTY);
+            late.push(|_| ());
         }
         assert_eq!(late.nodes.iter().map(|n| n.0).collect::<Vec<_>>(), [1, 2, 3]);
     }

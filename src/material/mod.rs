@@ -104,6 +104,17 @@ impl Material {
         matches!(self, Self::Diffuse { .. } | Self::Phong(_))
     }
 
+    /// The reflectance where [`Material::response`] is nothing but Lambert's law: that, over π, times the
+    /// cosine.
+    #[inline]
+    pub fn lambertian(&self) -> Option<Rgb> {
+        match self {
+            Self::Diffuse { reflectance } => Some(*reflectance),
+            Self::Phong(phong) => phong.specular.is_black().then_some(phong.diffuse),
+            Self::Mirror { .. } | Self::Conductor(_) | Self::Dielectric(_) => None,
+        }
+    }
+
     /// Whether light passes it.
     #[inline]
     pub fn is_glass(&self) -> bool {

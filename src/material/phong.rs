@@ -60,10 +60,10 @@ impl Phong {
     /// Radiance towards `wo` for each unit of irradiance on a plane facing `wi`, `cos_theta` = n·wi > 0.
     #[inline]
     pub(super) fn response(&self, n: Vec3, wo: Vec3, wi: Vec3, cos_theta: f32) -> Rgb {
-        let diffuse = self.diffuse * cos_theta;
         if self.specular.is_black() {
-            return diffuse * FRAC_1_PI;
+            return self.diffuse * (cos_theta * FRAC_1_PI);
         }
+        let diffuse = self.diffuse * cos_theta;
         let cos_alpha = match self.model {
             PhongModel::BlinnPhong => n.dot((wi + wo).normalize_or_zero()),
             PhongModel::Phong => (n * (2.0 * cos_theta) - wi).dot(wo),

@@ -5,12 +5,14 @@
 //! them. Nothing here knows what is hit or how it looks.
 
 mod bounds;
+mod lanes;
 mod quartic;
 mod ray;
 mod rounding;
 mod warp;
 
 pub use bounds::Bounds;
+pub use lanes::{Vec3Lanes, unit_or_zero};
 pub use quartic::Quartic;
 pub use ray::Ray;
 pub use rounding::{gamma, offset_ray_origin};

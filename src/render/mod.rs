@@ -13,7 +13,7 @@ use crate::film::{BLOCK_LANES, BlockAccumulator, Film, FilterTable, PixelRect};
 use crate::integrator::{
     Ao, CameraBlock, Everything, Flat, Integrator, Local, RayCounts, Tree, Whitted,
 };
-use crate::sampler::{Dimensions, REPLICATES, Sampler};
+use crate::sampler::{Dimensions, PixelSampler, REPLICATES, Sampler};
 use crate::scene::{IntegratorKind, Scene, Variant};
 
 /// Pixels of a tile's side: a multiple of the block's 4.
@@ -134,10 +134,10 @@ fn run<Q: RayQuery, I: Integrator>(
         whole,
     };
 
-    let accumulator = || BlockAccumulator::new(REPLICATES);
-    tiles.par_iter().for_each_init(accumulator, |sums, tile| {
-        let mut output = TileOutput::default();
-        let pixels = renderer.render(tile, &window, sums, &mut output, observer);
+    let workspace = || (BlockAccumulator::new(REPLICATES), TileOutput::default());
+    tiles.par_iter().for_each_init(workspace, |(sums, output), tile| {
+        output.restart();
+        let pixels = renderer.render(tile, &window, sums, output, observer);
         {
             let mut film = film.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             output.blocks.iter().for_each(|block| film.put(block));
@@ -196,6 +196,15 @@ struct TileOutput {
     non_finite: NonFinite,
 }
 
+impl TileOutput {
+    /// Forgets the last tile; memory for blocks stays.
+    fn restart(&mut self) {
+        self.blocks.clear();
+        self.rays = RayCounts::default();
+        self.non_finite = NonFinite::default();
+    }
+}
+
 impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
     /// Renders the blocks of a tile that touch the window; whole blocks, as a packet's hits at shared
     /// edges may depend on its neighbours, and a crop must not. Returns the pixels of the window that
@@ -243,24 +252,14 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             .fold(0u16, |bits, lane| bits | 1 << lane);
 
         sums.restart(0);
+        let pixels: [PixelSampler; LANES] =
+            std::array::from_fn(|lane| PixelSampler::new(self.seed, pixel(lane)));
         for sample in 0..self.samples {
             if sample % STOP_EVERY == 0 && observer.stop() {
                 return false;
             }
-            let samplers = std::array::from_fn(|lane| Sampler::new(self.seed, pixel(lane), sample));
-            let mut rays = RayBlock::empty();
-            let mut weights = [1.0; LANES];
-            for lane in (0..LANES).filter(|lane| inside >> lane & 1 == 1) {
-                let [x, y] = pixel(lane);
-                let [u, v, lens_u, lens_v] = samplers[lane].four(Dimensions::Camera);
-                let position = self.filter.sample([u, v]);
-                weights[lane] = position.weight;
-                let [dx, dy] = position.offset.map(f64::from);
-                let film = DVec2::new(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy);
-                if let Some(ray) = self.scene.camera.ray(film, [lens_u, lens_v]) {
-                    rays.set(lane, &ray);
-                }
-            }
+            let samplers = pixels.map(|pixel| pixel.sample(sample));
+            let (rays, weights) = self.camera_rays(origin, inside, &samplers);
             output.rays.camera += u64::from(rays.active().count_ones());
             let hits = self.query.intersect_block(&rays);
             let camera = CameraBlock { rays: &rays, hits: &hits, samplers: &samplers };
@@ -283,5 +282,49 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
         }
         output.blocks.push(sums.finish(origin));
         true
+    }
+
+    /// The camera rays of one sample of the pixels of a block that are `inside` the picture, and what the
+    /// filter makes of what they see.
+    #[inline]
+    fn camera_rays(
+        &self,
+        [x0, y0]: [u32; 2],
+        inside: u16,
+        samplers: &[Sampler; LANES],
+    ) -> (RayBlock, [f32; LANES]) {
+        let camera = &self.scene.camera;
+        let (u, v, lens) = if camera.has_lens() {
+            let [u, v, lens_u, lens_v] = Sampler::numbers(samplers, Dimensions::Camera);
+            (u, v, [lens_u, lens_v])
+        } else {
+            let [u, v] = Sampler::numbers(samplers, Dimensions::Camera);
+            (u, v, [[0.5; LANES]; 2])
+        };
+        let (mut x, mut y, mut weights) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
+        for lane in 0..LANES {
+            let position = self.filter.sample([u[lane], v[lane]]);
+            let [dx, dy] = position.offset.map(f64::from);
+            x[lane] = f64::from(x0 + lane as u32 % 4) + 0.5 + dx;
+            y[lane] = f64::from(y0 + lane as u32 / 4) + 0.5 + dy;
+            weights[lane] = position.weight;
+        }
+        let mut rays = RayBlock::empty();
+        if let Some((eye, directions)) = camera.pinhole_rays(&x, &y) {
+            rays.org_x = [eye.x; LANES];
+            rays.org_y = [eye.y; LANES];
+            rays.org_z = [eye.z; LANES];
+            (rays.dir_x, rays.dir_y, rays.dir_z) = (directions.x, directions.y, directions.z);
+            rays.t_max = [f32::INFINITY; LANES];
+            rays.activate(inside);
+            return (rays, weights);
+        }
+        for lane in (0..LANES).filter(|lane| inside >> lane & 1 == 1) {
+            let film = DVec2::new(x[lane], y[lane]);
+            if let Some(ray) = camera.ray(film, lens.map(|numbers| numbers[lane])) {
+                rays.set(lane, &ray);
+            }
+        }
+        (rays, weights)
     }
 }

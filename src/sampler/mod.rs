@@ -6,6 +6,8 @@
 //! of the others: from the spread of the replicates' means follows an error that is true, where the
 //! spread of single samples would overstate it many times (see [`crate::film`]).
 
+mod lanes;
+
 /// Replicates of a pixel. Fewer cost less convergence, more give a surer error.
 pub const REPLICATES: u32 = 4;
 
@@ -36,15 +38,36 @@ pub struct Sampler {
     index: u32,
 }
 
+/// The samples of one pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PixelSampler {
+    /// Hash of seed and pixel.
+    hash: u64,
+}
+
+impl PixelSampler {
+    /// Those of the pixel at absolute coordinates `(x, y)`.
+    #[inline]
+    pub fn new(seed: u64, [x, y]: [u32; 2]) -> Self {
+        let pixel = u64::from(x) | u64::from(y) << 32;
+        Self { hash: mix(mix(seed ^ 0x9e37_79b9_7f4a_7c15) ^ pixel) }
+    }
+
+    /// The sampler of one of them.
+    #[inline]
+    pub fn sample(self, sample: u32) -> Sampler {
+        let (replicate, index) = (sample % REPLICATES, sample / REPLICATES);
+        let stream = u64::from(replicate) | u64::from(index / SEQUENCE) << 32;
+        let hash = mix(self.hash ^ stream);
+        Sampler { stream: (hash >> 32) as u32, index: index % SEQUENCE }
+    }
+}
+
 impl Sampler {
     /// The sampler of sample `sample` of the pixel at absolute coordinates `(x, y)`.
     #[inline]
-    pub fn new(seed: u64, [x, y]: [u32; 2], sample: u32) -> Self {
-        let (replicate, index) = (sample % REPLICATES, sample / REPLICATES);
-        let pixel = u64::from(x) | u64::from(y) << 32;
-        let stream = u64::from(replicate) | u64::from(index / SEQUENCE) << 32;
-        let hash = mix(mix(mix(seed ^ 0x9e37_79b9_7f4a_7c15) ^ pixel) ^ stream);
-        Self { stream: (hash >> 32) as u32, index: index % SEQUENCE }
+    pub fn new(seed: u64, pixel: [u32; 2], sample: u32) -> Self {
+        PixelSampler::new(seed, pixel).sample(sample)
     }
 
     /// Four numbers in [0, 1) for one use, well distributed over the samples of a replicate, the first two
@@ -54,11 +77,16 @@ impl Sampler {
     /// later dimensions fill their squares less evenly (Burley's padding).
     #[inline]
     pub fn four(&self, dimensions: Dimensions) -> [f32; 4] {
-        let stream = match dimensions {
+        sobol_burley::sample_4d(self.index, 0, self.stream_of(dimensions))
+    }
+
+    /// The seed of the sequence of one use.
+    #[inline]
+    fn stream_of(&self, dimensions: Dimensions) -> u32 {
+        match dimensions {
             Dimensions::Camera => self.stream,
             other => self.branch(!(other as u32)).stream,
-        };
-        sobol_burley::sample_4d(self.index, 0, stream)
+        }
     }
 
     /// The sampler of one of several branches, independent of its siblings and of this one: a node of

@@ -16,6 +16,7 @@ mod requirements;
 mod scatter;
 mod solids;
 mod surface;
+mod surface_block;
 mod tessellate;
 mod volumes;
 
@@ -30,5 +31,6 @@ pub use media::Crossing;
 pub use requirements::{Requirements, Variant};
 pub use scatter::{Scatter, Turn};
 pub use surface::SurfacePoint;
+pub use surface_block::SurfaceBlock;
 pub use tessellate::Tessellation;
 pub use volumes::VolumeDesc;

@@ -6,7 +6,7 @@ use super::build::Scene;
 use crate::accel::{Geometry, Hit, Transform3x4, affine_from_rows};
 use crate::geometry::{AnalyticShape, Shapes, TriangleMesh, with_shapes};
 use crate::material::Material;
-use crate::math::{Ray, gamma, offset_ray_origin};
+use crate::math::{Ray, gamma, offset_ray_origin, unit_or_zero};
 use crate::scene::desc::Epsilon;
 
 /// A point on a surface, seen along a ray.
@@ -31,11 +31,34 @@ pub struct SurfacePoint<'a> {
 
 /// Position, error, outward geometric and shading normal (of unit length, or zero where there is none)
 /// in one space.
-struct Local {
-    position: Vec3,
-    error: f32,
-    geometric_normal: Vec3,
-    normal: Vec3,
+#[derive(Clone, Copy)]
+pub(super) struct Local {
+    pub(super) position: Vec3,
+    pub(super) error: f32,
+    pub(super) geometric_normal: Vec3,
+    pub(super) normal: Vec3,
+}
+
+/// The normals as seen from one side.
+pub(super) struct Facing {
+    pub(super) geometric_normal: Vec3,
+    pub(super) normal: Vec3,
+    pub(super) is_front: bool,
+}
+
+impl Local {
+    /// The normals on the side that a ray into `direction` comes from.
+    #[inline(always)]
+    pub(super) fn facing(&self, direction: Vec3) -> Facing {
+        // A triangle of no area has no normal: any will do, as long as it faces the viewer.
+        let outward = or_else(self.geometric_normal, -direction);
+        let is_front = outward.dot(direction) <= 0.0;
+        let side = if is_front { 1.0 } else { -1.0 };
+        let normal = or_else(self.normal, outward);
+        // An interpolated normal may point to the other side of its triangle; the geometric one decides.
+        let normal = if normal.dot(outward) < 0.0 { -normal } else { normal };
+        Facing { geometric_normal: outward * side, normal: normal * side, is_front }
+    }
 }
 
 impl Scene {
@@ -70,7 +93,10 @@ impl Scene {
         let material_index = self.look(hit).material;
         let transform = hit.copy.map(|copy| self.world.transform(copy));
         let local = match geometry {
-            Geometry::Mesh(mesh) => on_triangle(mesh, hit),
+            Geometry::Mesh(mesh) => {
+                let smooth = smooth_normal(mesh, hit);
+                on_triangle(mesh.corners(hit.primitive as usize), hit.u, hit.v, smooth)
+            }
             Geometry::Shapes(shapes) => with_shapes!(shapes, list => {
                 on_shape(&list[hit.primitive as usize], ray, hit, transform)
             }),
@@ -79,18 +105,12 @@ impl Scene {
             None => local,
             Some(rows) => to_world(&local, rows),
         };
-        // A triangle of no area has no normal: any will do, as long as it faces the viewer.
-        let outward = or_else(placed.geometric_normal, -ray.direction);
-        let is_front = outward.dot(ray.direction) <= 0.0;
-        let side = if is_front { 1.0 } else { -1.0 };
-        let normal = or_else(placed.normal, outward);
-        // An interpolated normal may point to the other side of its triangle; the geometric one decides.
-        let normal = if normal.dot(outward) < 0.0 { -normal } else { normal };
+        let Facing { geometric_normal, normal, is_front } = placed.facing(ray.direction);
         SurfacePoint {
             position: placed.position,
             error: placed.error,
-            geometric_normal: outward * side,
-            normal: normal * side,
+            geometric_normal,
+            normal,
             is_front,
             material: &self.materials[material_index as usize],
             material_index,
@@ -107,24 +127,43 @@ impl Scene {
     /// The ray that leaves `point` into `direction` (unit length), as far as `distance`.
     #[inline]
     pub fn spawn(&self, point: &SurfacePoint<'_>, direction: Vec3, distance: f32) -> Ray {
-        // Short of the target by a few times the error of a hit's distance, so that a light on a
-        // surface is not hidden by it.
-        let t_max = distance * (1.0 - 16.0 * f32::EPSILON);
-        let (origin, t_min) = match self.settings.epsilon {
-            Epsilon::Auto => (
-                offset_ray_origin(point.position, point.error, point.geometric_normal, direction),
-                0.0,
-            ),
-            Epsilon::Fixed(epsilon) => (point.position, epsilon),
-        };
-        Ray { origin, direction, t_min, t_max }
+        let (p, n) = (point.position, point.geometric_normal);
+        spawn(self.settings.epsilon, p, point.error, n, direction, distance)
     }
 }
 
+/// The ray that leaves the point `p` of a surface with the geometric normal `n`: see [`Scene::spawn`].
+#[inline(always)]
+pub(super) fn spawn(
+    epsilon: Epsilon,
+    p: Vec3,
+    error: f32,
+    n: Vec3,
+    direction: Vec3,
+    distance: f32,
+) -> Ray {
+    // Short of the target by a few times the error of a hit's distance, so that a light on a surface is
+    // not hidden by it.
+    let t_max = distance * (1.0 - 16.0 * f32::EPSILON);
+    let (origin, t_min) = match epsilon {
+        Epsilon::Auto => (offset_ray_origin(p, error, n, direction), 0.0),
+        Epsilon::Fixed(epsilon) => (p, epsilon),
+    };
+    Ray { origin, direction, t_min, t_max }
+}
+
 /// A unit normal, or another where it is zero.
-#[inline]
+#[inline(always)]
 fn or_else(normal: Vec3, other: Vec3) -> Vec3 {
     if normal == Vec3::ZERO { other } else { normal }
+}
+
+/// The interpolated normal of a hit on a mesh, not of unit length; none where the mesh has no normals.
+#[inline]
+pub(super) fn smooth_normal(mesh: &TriangleMesh, hit: &Hit) -> Option<Vec3> {
+    let normals = mesh.normals.as_ref()?;
+    let [i, j, k] = mesh.triangles[hit.primitive as usize].map(|i| Vec3::from(normals[i as usize]));
+    Some(i * (1.0 - hit.u - hit.v) + j * hit.u + k * hit.v)
 }
 
 /// The point with barycentric weights (1 − u − v, u, v).
@@ -132,10 +171,8 @@ fn or_else(normal: Vec3, other: Vec3) -> Vec3 {
 /// The bound on its position is γ(7)·Σ|bᵢ pᵢ| (pbrt 4ed §6.8.4). Added is what a query may see: it
 /// subtracts the ray's origin from each corner, so its plane is off by a few roundings of the distance
 /// to the farthest corner.
-#[inline]
-fn on_triangle(mesh: &TriangleMesh, hit: &Hit) -> Local {
-    let [a, b, c] = mesh.corners(hit.primitive as usize);
-    let (u, v) = (hit.u, hit.v);
+#[inline(always)]
+pub(super) fn on_triangle([a, b, c]: [Vec3; 3], u: f32, v: f32, smooth: Option<Vec3>) -> Local {
     let w = 1.0 - u - v;
     let (pa, pb, pc) = (a * w, b * u, c * v);
     let position = pa + pb + pc;
@@ -144,19 +181,12 @@ fn on_triangle(mesh: &TriangleMesh, hit: &Hit) -> Local {
     // In f64: the square of an f32 cross product overflows from edges of 4·10⁹ on, and vanishes below
     // 2·10⁻¹¹.
     let (da, db, dc) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
-    let geometric_normal = (db - da).cross(dc - da).normalize_or_zero().as_vec3();
-    let normal = match &mesh.normals {
-        None => geometric_normal,
-        Some(normals) => {
-            let [i, j, k] = mesh.triangles[hit.primitive as usize].map(|i| normals[i as usize]);
-            (Vec3::from(i) * w + Vec3::from(j) * u + Vec3::from(k) * v).normalize_or_zero()
-        }
-    };
+    let geometric_normal = unit_or_zero((db - da).cross(dc - da)).as_vec3();
     Local {
         position,
         error: gamma(7) * sum + gamma(8) * reach.max_element(),
         geometric_normal,
-        normal,
+        normal: smooth.map_or(geometric_normal, Vec3::normalize_or_zero),
     }
 }
 
@@ -196,7 +226,7 @@ fn point_along(ray: &Ray, t: f32, transform: Option<&Transform3x4>) -> DVec3 {
 /// The bound follows pbrt 4ed §6.8.5. Added is what a query may see: it takes the ray to the copy's
 /// space by an inverse that is itself rounded, which shows in the world as |M|·|M⁻¹| times the
 /// coordinates: little for a rotation, much for a squeeze.
-fn to_world(local: &Local, rows: &Transform3x4) -> Local {
+pub(super) fn to_world(local: &Local, rows: &Transform3x4) -> Local {
     let row =
         |i: usize| (Vec3::new(rows[4 * i], rows[4 * i + 1], rows[4 * i + 2]), rows[4 * i + 3]);
     let m = [row(0), row(1), row(2)];

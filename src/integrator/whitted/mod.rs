@@ -12,6 +12,7 @@
 //! mirrors, glass and lamps, runs code that knows of nothing else.
 
 mod light;
+mod local;
 mod scatter;
 mod shadow;
 mod volume;
@@ -213,6 +214,9 @@ impl<F: Features> Integrator for Whitted<F> {
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
     ) -> [Rgb; LANES] {
+        if !F::TREE {
+            return local::shade(scene, query, camera, counts);
+        }
         let mut walk = Walk::<Q, F> {
             scene,
             query,

@@ -1,0 +1,157 @@
+//! Direct light alone, a block at a time: the variant without a tree. The loops over lanes are without
+//! branches, for the compiler to turn into vector instructions.
+
+use super::super::{CameraBlock, RayCounts};
+use crate::accel::{LANES, RayQuery, lanes_of};
+use crate::color::Rgb;
+use crate::light::Light;
+use crate::math::Vec3Lanes;
+use crate::scene::{Scene, SurfaceBlock};
+
+/// Colours side by side, by component.
+type RgbLanes = [[f32; LANES]; 3];
+
+/// The light that arrives from one lamp, by lane.
+struct Arriving {
+    direction: Vec3Lanes<LANES>,
+    distance: [f32; LANES],
+    irradiance: RgbLanes,
+    /// Where any does.
+    lanes: u16,
+}
+
+/// What the materials of a block leave of light.
+struct Looks {
+    /// Reflectance of those that scatter as Lambert's law says; black elsewhere.
+    lambertian: RgbLanes,
+    /// Lanes of other materials that are lit.
+    others: u16,
+    /// Of all that are lit.
+    lit: u16,
+}
+
+/// The radiance along each camera ray of a block: what the surfaces show of ambient light and lamps.
+pub(super) fn shade<Q: RayQuery>(
+    scene: &Scene,
+    query: &Q,
+    camera: &CameraBlock<'_>,
+    counts: &mut RayCounts,
+) -> [Rgb; LANES] {
+    let points = scene.surfaces(camera.rays, camera.hits);
+    counts.ends.miss += u64::from((camera.rays.active() & !points.hit()).count_ones());
+    let mut radiance = [[0.0; LANES]; 3];
+    let looks = looks(scene, &points, &mut radiance);
+    for light in scene.lights.iter().filter(|_| looks.lit != 0) {
+        let arriving = arriving(light, &points, looks.lit);
+        let (light, lanes) = reflected(scene, camera, &points, &looks, &arriving);
+        if lanes == 0 {
+            continue;
+        }
+        let mut passes = lanes;
+        if scene.settings.shadows.are_cast() {
+            counts.shadow += u64::from(lanes.count_ones());
+            let rays = scene.spawn_block(&points, &arriving.direction, &arriving.distance, lanes);
+            passes &= !query.occluded_block(&rays);
+        }
+        for (sum, light) in radiance.iter_mut().zip(&light) {
+            for i in 0..LANES {
+                sum[i] += if passes >> i & 1 == 1 { light[i] } else { 0.0 };
+            }
+        }
+    }
+    std::array::from_fn(|lane| {
+        if points.hit() >> lane & 1 == 0 {
+            return scene.background;
+        }
+        radiance.map(|c| c[lane]).into()
+    })
+}
+
+/// What is lit and how; their ambient light is added to `radiance`.
+#[inline]
+fn looks(scene: &Scene, points: &SurfaceBlock, radiance: &mut RgbLanes) -> Looks {
+    let mut looks = Looks { lambertian: [[0.0; LANES]; 3], others: 0, lit: 0 };
+    for lane in lanes_of(points.hit()) {
+        let material = points.material(scene, lane);
+        if !material.is_lit() {
+            continue;
+        }
+        looks.lit |= 1 << lane;
+        let ambient = (material.ambient() * scene.ambient).to_array();
+        let lambertian = material.lambertian();
+        looks.others |= u16::from(lambertian.is_none()) << lane;
+        let reflectance = lambertian.unwrap_or(Rgb::BLACK).to_array();
+        for c in 0..3 {
+            radiance[c][lane] = ambient[c];
+            looks.lambertian[c][lane] = reflectance[c];
+        }
+    }
+    looks
+}
+
+/// What a lamp without size sends to the points of `lanes`.
+#[inline]
+fn arriving(light: &Light, points: &SurfaceBlock, lanes: u16) -> Arriving {
+    let alike = |direction, distance, irradiance: Rgb| Arriving {
+        direction: Vec3Lanes::splat(direction),
+        distance: [distance; LANES],
+        irradiance: irradiance.to_array().map(|c| [c; LANES]),
+        lanes,
+    };
+    if let Light::Directional(sun) = light {
+        return alike(-sun.direction, f32::INFINITY, sun.irradiance);
+    }
+    let mut arriving = Arriving { lanes: 0, ..alike(glam::Vec3::ZERO, 0.0, Rgb::BLACK) };
+    for lane in lanes_of(lanes) {
+        let Some(sample) = light.sample(points.position.get(lane), [0.5; 2]) else { continue };
+        arriving.lanes |= 1 << lane;
+        arriving.direction.set(lane, sample.direction);
+        arriving.distance[lane] = sample.distance;
+        for (c, value) in sample.irradiance.to_array().into_iter().enumerate() {
+            arriving.irradiance[c][lane] = value;
+        }
+    }
+    arriving
+}
+
+/// What leaves towards the camera if nothing stands between, and where that is anything.
+#[inline]
+fn reflected(
+    scene: &Scene,
+    camera: &CameraBlock<'_>,
+    points: &SurfaceBlock,
+    looks: &Looks,
+    arriving: &Arriving,
+) -> (RgbLanes, u16) {
+    let mut light = [[0.0; LANES]; 3];
+    let mut is_reflected = [false; LANES];
+    for i in 0..LANES {
+        let l = arriving.direction.get(i);
+        let cos = points.normal.get(i).dot(l);
+        // Not from behind the surface itself, whatever its shading normal says.
+        let is_before = (l.dot(points.geometric_normal.get(i)) > 0.0) & (cos > 0.0);
+        let share = cos * std::f32::consts::FRAC_1_PI;
+        let mut is_black = true;
+        for c in 0..3 {
+            let response = looks.lambertian[c][i] * share;
+            is_black &= response == 0.0;
+            light[c][i] = response * arriving.irradiance[c][i];
+        }
+        is_reflected[i] = is_before & !is_black;
+    }
+    let bits = |flags: &[bool; LANES]| {
+        (0..LANES).fold(0u16, |bits, lane| bits | u16::from(flags[lane]) << lane)
+    };
+    let mut lanes = bits(&is_reflected);
+    for lane in lanes_of(looks.others & arriving.lanes) {
+        let (point, l) = (points.point(scene, lane), arriving.direction.get(lane));
+        let response = point.material.response(point.normal, -camera.rays.get(lane).direction, l);
+        if l.dot(point.geometric_normal) > 0.0 && !response.is_black() {
+            for (c, share) in response.to_array().into_iter().enumerate() {
+                light[c][lane] = share * arriving.irradiance[c][lane];
+            }
+            lanes |= 1 << lane;
+        }
+    }
+    (light, lanes & arriving.lanes)
+}
