@@ -46,19 +46,17 @@ pub(super) struct Facing {
     pub(super) is_front: bool,
 }
 
-impl Local {
-    /// The normals on the side that a ray into `direction` comes from.
-    #[inline(always)]
-    pub(super) fn facing(&self, direction: Vec3) -> Facing {
-        // A triangle of no area has no normal: any will do, as long as it faces the viewer.
-        let outward = or_else(self.geometric_normal, -direction);
-        let is_front = outward.dot(direction) <= 0.0;
-        let side = if is_front { 1.0 } else { -1.0 };
-        let normal = or_else(self.normal, outward);
-        // An interpolated normal may point to the other side of its triangle; the geometric one decides.
-        let normal = if normal.dot(outward) < 0.0 { -normal } else { normal };
-        Facing { geometric_normal: outward * side, normal: normal * side, is_front }
-    }
+/// Geometric and shading normal, turned to the side that a ray into `direction` comes from.
+#[inline(always)]
+pub(super) fn facing(geometric_normal: Vec3, normal: Vec3, direction: Vec3) -> Facing {
+    // A triangle of no area has no normal: any will do, as long as it faces the viewer.
+    let outward = or_else(geometric_normal, -direction);
+    let is_front = outward.dot(direction) <= 0.0;
+    let side = if is_front { 1.0 } else { -1.0 };
+    let normal = or_else(normal, outward);
+    // An interpolated normal may point to the other side of its triangle; the geometric one decides.
+    let normal = if normal.dot(outward) < 0.0 { -normal } else { normal };
+    Facing { geometric_normal: outward * side, normal: normal * side, is_front }
 }
 
 impl Scene {
@@ -105,7 +103,8 @@ impl Scene {
             None => local,
             Some(rows) => to_world(&local, rows),
         };
-        let Facing { geometric_normal, normal, is_front } = placed.facing(ray.direction);
+        let Facing { geometric_normal, normal, is_front } =
+            facing(placed.geometric_normal, placed.normal, ray.direction);
         SurfacePoint {
             position: placed.position,
             error: placed.error,

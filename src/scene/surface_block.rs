@@ -1,8 +1,10 @@
 //! The surface points of a block side by side: what [`Scene::surface`] finds for each lane, in loops over
 //! lanes that the compiler turns into vector instructions.
 
+use glam::Vec3;
+
 use super::build::Scene;
-use super::surface::{Facing, Local, SurfacePoint, on_triangle, smooth_normal, spawn, to_world};
+use super::surface::{Local, SurfacePoint, facing, on_triangle, smooth_normal, spawn, to_world};
 use crate::accel::{Geometry, HitBlock, LANES, RayBlock, lanes_of};
 use crate::material::Material;
 use crate::math::Vec3Lanes;
@@ -99,12 +101,8 @@ impl Scene {
         }
 
         if others != block.hit {
-            for i in 0..LANES {
-                let local = on_triangle(corners.map(|corner| corner.get(i)), u[i], v[i], None);
-                block.position.set(i, local.position);
-                block.error[i] = local.error;
-                block.geometric_normal.set(i, local.geometric_normal);
-            }
+            let SurfaceBlock { position, error, geometric_normal, .. } = &mut block;
+            on_triangles(&corners, &u, &v, position, error, geometric_normal);
             block.normal = block.geometric_normal;
             if is_smooth.contains(&true) {
                 for i in 0..LANES {
@@ -122,15 +120,8 @@ impl Scene {
                     block.normal.set(lane, placed.normal);
                 }
             }
-            let (dir_x, dir_y, dir_z) = (rays.dir_x, rays.dir_y, rays.dir_z);
-            let directions = Vec3Lanes { x: dir_x, y: dir_y, z: dir_z };
-            for i in 0..LANES {
-                let Facing { geometric_normal, normal, is_front } =
-                    block.local(i).facing(directions.get(i));
-                block.geometric_normal.set(i, geometric_normal);
-                block.normal.set(i, normal);
-                block.is_front[i] = is_front;
-            }
+            let SurfaceBlock { geometric_normal, normal, is_front, .. } = &mut block;
+            face(rays, geometric_normal, normal, is_front);
         }
         for lane in lanes_of(others) {
             if let Some(hit) = hits.get(lane) {
@@ -161,6 +152,43 @@ impl Scene {
         }
         rays.activate(lanes);
         rays
+    }
+}
+
+/// Position, error and normal of points on triangles.
+// Not inlined: the compiler sees best by itself that nothing here overlaps.
+#[inline(never)]
+fn on_triangles(
+    corners: &[Vec3Lanes<LANES>; 3],
+    u: &[f32; LANES],
+    v: &[f32; LANES],
+    position: &mut Vec3Lanes<LANES>,
+    error: &mut [f32; LANES],
+    normal: &mut Vec3Lanes<LANES>,
+) {
+    for i in 0..LANES {
+        let corners = [corners[0].get(i), corners[1].get(i), corners[2].get(i)];
+        let local = on_triangle(corners, u[i], v[i], None);
+        position.set(i, local.position);
+        error[i] = local.error;
+        normal.set(i, local.geometric_normal);
+    }
+}
+
+/// Turns the normals to the side that the rays come from.
+#[inline(never)]
+fn face(
+    rays: &RayBlock,
+    geometric_normal: &mut Vec3Lanes<LANES>,
+    normal: &mut Vec3Lanes<LANES>,
+    is_front: &mut [bool; LANES],
+) {
+    for i in 0..LANES {
+        let direction = Vec3::new(rays.dir_x[i], rays.dir_y[i], rays.dir_z[i]);
+        let facing = facing(geometric_normal.get(i), normal.get(i), direction);
+        geometric_normal.set(i, facing.geometric_normal);
+        normal.set(i, facing.normal);
+        is_front[i] = facing.is_front;
     }
 }
 
