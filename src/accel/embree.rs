@@ -7,9 +7,13 @@ use std::thread;
 use std::time::Duration;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::block::{HitBlock, LANES, RayBlock, lanes_of};
-use super::world::{CopyRef, Geometry, Group, InstanceSet, World};
+use super::reach::Reach;
+use super::world::{
+    CopyRef, Geometry, Group, InstanceSet, Transform3x4, World, affine_from_rows, rows_from_affine,
+};
 use super::{AccelError, AccelInfo, BuildOptions, BuildQuality, Hit, Precision, RayQuery};
 use crate::embree::{
     self, BuildProgress, Device, DeviceConfig, EmbreeError, ErrorCode, INVALID_ID, PacketMask,
@@ -17,11 +21,7 @@ use crate::embree::{
     UserHit,
 };
 use crate::geometry::{AnalyticShape, with_shapes};
-use crate::math::Ray;
-
-/// Sets with more copies than this become instance arrays: 90 bytes a copy instead of 330, for
-/// rays that are up to a seventh slower.
-const ARRAY_FROM: usize = 1 << 16;
+use crate::math::{Bounds, Ray};
 
 /// Masks of geometries, and of the rays that see them: a copy has Embree's default, that of what is
 /// opaque, so such rays enter it.
@@ -34,14 +34,9 @@ const ALL: u32 = !0;
 pub struct EmbreeAccel {
     scene: Scene,
     packet_width: usize,
-    /// For each instance set its first instance id and whether it is one array, by rising id.
-    sets: Vec<SetIds>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct SetIds {
-    first: u32,
-    is_array: bool,
+    /// Which instance set each id above those of the root's geometries stands for.
+    sets: Vec<u32>,
+    first_set: u32,
 }
 
 impl EmbreeAccel {
@@ -110,16 +105,23 @@ impl EmbreeAccel {
         }
         let mut builder = SceneBuilder::new(device, flags, quality)?;
         attach_group(&mut builder, device, &world.root, quality)?;
-        let mut next_id = world.root.geometries.len() as u32;
+        let reaches: Vec<_> = world.prototypes.iter().map(Reach::of).collect();
+        let first_set = world.root.geometries.len() as u32;
         let mut sets = Vec::with_capacity(world.sets.len());
-        for set in &world.sets {
-            let ids = SetIds { first: next_id, is_array: set.transforms.len() > ARRAY_FROM };
-            next_id +=
-                attach_set(&mut builder, device, &prototypes[set.prototype as usize], set, ids)?;
-            sets.push(ids);
+        for (index, set) in (0u32..).zip(&world.sets) {
+            let prototype = set.prototype as usize;
+            // Copies of nothing are nothing.
+            let Some(reach) = &reaches[prototype] else { continue };
+            let copies = copies(device, &prototypes[prototype], set, reach)?;
+            assert_eq!(
+                builder.attach(copies),
+                first_set + sets.len() as u32,
+                "Embree numbers geometries in order"
+            );
+            sets.push(index);
         }
         let scene = commit(builder, size(&world.root))?;
-        Ok(Self { scene, packet_width: device.packet_width(), sets })
+        Ok(Self { scene, packet_width: device.packet_width(), sets, first_set })
     }
 
     /// Name, version, instruction set and memory, for reports and file headers.
@@ -143,10 +145,8 @@ impl EmbreeAccel {
         let copy = if hit.instance == INVALID_ID {
             None
         } else {
-            let set = self.sets.partition_point(|s| s.first <= hit.instance) - 1;
-            let SetIds { first, is_array } = self.sets[set];
-            let index = if is_array { hit.instance_primitive } else { hit.instance - first };
-            Some(CopyRef { set: set as u32, index })
+            let set = self.sets[(hit.instance - self.first_set) as usize];
+            Some(CopyRef { set, index: hit.instance_primitive })
         };
         // Robust traversal leaves the weights a little outside where the origin is far.
         let u = hit.u.clamp(0.0, 1.0);
@@ -313,25 +313,24 @@ fn attach_group(
     Ok(())
 }
 
-/// Attaches the copies of a set and returns how many ids they took.
-fn attach_set(
-    builder: &mut SceneBuilder,
+/// The copies of a set, each in a box that fits it. Of turned solids Embree's own instances, in the box of
+/// a turned box, are entered by twice as many rays.
+fn copies(
     device: &Device,
     prototype: &Scene,
     set: &InstanceSet,
-    ids: SetIds,
-) -> Result<u32, EmbreeError> {
-    if ids.is_array {
-        let transforms = Arc::clone(&set.transforms);
-        let array = embree::Geometry::instance_array(device, prototype, transforms)?;
-        assert_eq!(builder.attach(array), ids.first, "Embree numbers geometries in order");
-        return Ok(1);
-    }
-    for (i, transform) in (0u32..).zip(set.transforms.iter()) {
-        let id = builder.attach(embree::Geometry::instance(device, prototype, transform)?);
-        assert_eq!(id, ids.first + i, "Embree numbers geometries in order");
-    }
-    Ok(set.transforms.len() as u32)
+    reach: &Reach,
+) -> Result<embree::Geometry, EmbreeError> {
+    let place = |rows: &Transform3x4| {
+        let world_from_object = affine_from_rows(rows);
+        let object_from_world = rows_from_affine(&world_from_object.inverse());
+        let bounds = reach.bounds(&world_from_object);
+        // What the inverse, rounded, may move.
+        let pad = 8.0 * f64::from(f32::EPSILON) * bounds.min.abs().max(bounds.max.abs());
+        (object_from_world, outer_bounds(&Bounds { min: bounds.min - pad, max: bounds.max + pad }))
+    };
+    let (inverses, bounds) = set.transforms.par_iter().with_min_len(1024).map(place).unzip();
+    embree::Geometry::copies(device, prototype, inverses, bounds)
 }
 
 /// Builds while `progress` is told, now and then and on a thread of its own, how far it is.
@@ -366,15 +365,14 @@ fn user_geometry<S: AnalyticShape>(
     device: &Device,
     shapes: &Arc<Vec<S>>,
 ) -> Result<embree::Geometry, EmbreeError> {
-    let bounds = shapes.iter().map(outer_bounds).collect();
+    let bounds = shapes.iter().map(|shape| outer_bounds(&shape.bounds())).collect();
     embree::Geometry::user(device, bounds, Arc::new(Shapes(Arc::clone(shapes))))
 }
 
-/// The box of a shape, rounded outward to f32.
-fn outer_bounds(shape: &impl AnalyticShape) -> UserBounds {
+/// A box, rounded outward to f32.
+fn outer_bounds(b: &Bounds) -> UserBounds {
     /// Where things without end are taken to end: areas of boxes stay far from overflow.
     const END: f32 = 1e15;
-    let b = shape.bounds();
     let down = |p: DVec3| p.as_vec3().to_array().map(|x| x.next_down().max(-END));
     let up = |p: DVec3| p.as_vec3().to_array().map(|x| x.next_up().min(END));
     UserBounds { lower: down(b.min), upper: up(b.max) }

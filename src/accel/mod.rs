@@ -8,6 +8,8 @@ mod block;
 mod brute;
 #[cfg(feature = "embree")]
 mod embree;
+#[cfg(feature = "embree")]
+mod reach;
 mod world;
 
 use std::fmt;

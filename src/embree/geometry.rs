@@ -4,6 +4,7 @@ use std::any::Any;
 use std::ptr::NonNull;
 use std::sync::Arc;
 
+use super::copies;
 use super::device::Device;
 use super::error::EmbreeError;
 use super::scene::Scene;
@@ -230,6 +231,47 @@ impl Geometry {
         geometry.commit("set up an instance array")
     }
 
+    /// Many copies of a committed scene as one geometry, each in a box of its own: hits name the copy as
+    /// those of an instance array do.
+    ///
+    /// - `object_from_world`: the inverse of each copy's transform.
+    /// - `bounds`: a box around each copy, in the world.
+    ///
+    /// # Errors
+    /// As [`Geometry::instance`], and [`EmbreeError::Size`] where the lists differ in length or hold more
+    /// than 2³² − 1 copies.
+    pub fn copies(
+        device: &Device,
+        scene: &Scene,
+        object_from_world: Vec<Transform3x4>,
+        bounds: Vec<UserBounds>,
+    ) -> Result<Self, EmbreeError> {
+        let count = u32::try_from(bounds.len()).ok();
+        let Some(count) = count.filter(|_| object_from_world.len() == bounds.len()) else {
+            let expected = "as many boxes, fewer than 2^32".to_owned();
+            let got = object_from_world.len();
+            return Err(EmbreeError::Size { what: "transforms", expected, got });
+        };
+        let mut geometry = Self::new(device, sys::RTC_GEOMETRY_TYPE_USER)?;
+        geometry.check_prototype(scene)?;
+        let transforms = object_from_world;
+        let context = Arc::new(copies::Copies { prototype: scene.clone(), transforms, bounds });
+        let pointer = Arc::as_ptr(&context).cast_mut();
+        // SAFETY: the context, with the prototype in it, is kept by the geometry; the callbacks are those
+        // for what the pointer points to, and only read through it.
+        unsafe {
+            sys::rtcSetGeometryUserPrimitiveCount(geometry.raw(), count);
+            sys::rtcSetGeometryUserData(geometry.raw(), pointer.cast());
+            let bounds: sys::RTCBoundsFunction = Some(copies::bounds);
+            sys::rtcSetGeometryBoundsFunction(geometry.raw(), bounds, std::ptr::null_mut());
+            sys::rtcSetGeometryIntersectFunction(geometry.raw(), Some(copies::intersect));
+            sys::rtcSetGeometryOccludedFunction(geometry.raw(), Some(copies::occluded));
+        }
+        geometry._keep = vec![context];
+        geometry.is_instance = true;
+        geometry.commit("set up copies")
+    }
+
     /// The same, seen only by rays whose mask has a bit in common with `mask`. Without this the mask of
     /// a geometry is 1.
     ///
@@ -244,13 +286,18 @@ impl Geometry {
         self.commit("set the mask of a geometry")
     }
 
-    fn instanced_scene(&mut self, scene: &Scene) -> Result<(), EmbreeError> {
+    fn check_prototype(&self, scene: &Scene) -> Result<(), EmbreeError> {
         if !scene.device().is(&self.device) {
             return Err(EmbreeError::ForeignDevice);
         }
         if scene.has_instances() {
             return Err(EmbreeError::NestedInstances);
         }
+        Ok(())
+    }
+
+    fn instanced_scene(&mut self, scene: &Scene) -> Result<(), EmbreeError> {
+        self.check_prototype(scene)?;
         // SAFETY: both handles are live. Embree counts a reference to the scene; we keep the scene's
         // own buffers as well.
         unsafe { sys::rtcSetGeometryInstancedScene(self.raw(), scene.raw()) };

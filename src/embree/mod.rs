@@ -49,6 +49,7 @@
 //! ```
 #![expect(unsafe_code, reason = "the one room that calls C")]
 
+mod copies;
 mod device;
 mod error;
 mod geometry;

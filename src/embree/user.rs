@@ -41,6 +41,23 @@ pub struct UserBounds {
     pub upper: [f32; 3],
 }
 
+impl UserBounds {
+    #[inline]
+    pub(super) const fn to_native(self) -> sys::RTCBounds {
+        let ([lower_x, lower_y, lower_z], [upper_x, upper_y, upper_z]) = (self.lower, self.upper);
+        sys::RTCBounds {
+            lower_x,
+            lower_y,
+            lower_z,
+            align0: 0.0,
+            upper_x,
+            upper_y,
+            upper_z,
+            align1: 0.0,
+        }
+    }
+}
+
 /// What the callbacks of one geometry see.
 pub(super) struct Context<G> {
     pub(super) bounds: Vec<UserBounds>,
@@ -55,19 +72,8 @@ pub(super) unsafe extern "C" fn bounds<G: UserGeometry>(
     // registered together with this function and that the geometry keeps alive.
     let (args, context) = unsafe { (&*args, &*(*args).geometryUserPtr.cast::<Context<G>>()) };
     if let Some(b) = context.bounds.get(args.primID as usize) {
-        let ([lower_x, lower_y, lower_z], [upper_x, upper_y, upper_z]) = (b.lower, b.upper);
-        let bounds = sys::RTCBounds {
-            lower_x,
-            lower_y,
-            lower_z,
-            align0: 0.0,
-            upper_x,
-            upper_y,
-            upper_z,
-            align1: 0.0,
-        };
         // SAFETY: `bounds_o` points to an RTCBounds to be written.
-        unsafe { args.bounds_o.write(bounds) };
+        unsafe { args.bounds_o.write(b.to_native()) };
     }
 }
 
