@@ -270,6 +270,11 @@ impl Accel {
         }
     }
 
+    /// It behind dynamic dispatch, for tools and tests; a loop over rays that is to be fast matches once.
+    pub fn query(&self) -> &dyn RayQuery {
+        with_accel!(self, accel => accel)
+    }
+
     /// What was built.
     pub fn info(&self) -> AccelInfo {
         with_accel!(self, accel => accel.info())

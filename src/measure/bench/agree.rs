@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::rays::RayKind;
-use super::structures::Contestant;
-use crate::accel::{Hit, LANES, RayBlock};
+use super::structures::{Contestant, Packets, Singles};
+use crate::accel::{Hit, LANES, RayBlock, RayQuery};
 use crate::math::Ray;
 use crate::scene::Scene;
 
@@ -84,6 +84,27 @@ pub(super) fn compare(
         .zip(known)
         .map(|(block, known)| judge.block(row, block, known))
         .reduce(Agreement::default, sum)
+}
+
+/// Compares the answers of `row`, one by one and in blocks, with those of a reference one by one: what is
+/// hit first, and whether anything is. `rays` and all counts are over the four comparisons.
+pub fn agreement(
+    scene: &Scene,
+    reference: &dyn RayQuery,
+    row: &dyn RayQuery,
+    blocks: &[RayBlock],
+) -> Agreement {
+    let reference = Singles(reference);
+    let blocks: Vec<&RayBlock> = blocks.iter().collect();
+    let mut sum = Agreement::default();
+    for kind in [RayKind::Camera, RayKind::Shadow] {
+        let known = known(&reference, kind, &blocks);
+        let ways: [&dyn Contestant; 2] = [&Singles(row), &Packets(row)];
+        for way in ways {
+            sum += compare(scene, &reference, way, kind, &blocks, &known);
+        }
+    }
+    sum
 }
 
 struct Judge<'a> {

@@ -17,7 +17,7 @@ use crate::accel::{AccelKind, Geometry, Group, RayBlock};
 use crate::render::Observer;
 use crate::scene::Scene;
 
-pub use agree::Agreement;
+pub use agree::{Agreement, agreement};
 use agree::{compare, known};
 pub use page::html;
 use rays::spread;

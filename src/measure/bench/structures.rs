@@ -180,11 +180,11 @@ pub(super) trait Contestant: Sync {
     fn trace(&self, kind: RayKind, blocks: &[RayBlock]);
 }
 
-struct Singles<'a, Q>(&'a Q);
+pub(super) struct Singles<'a, Q: ?Sized>(pub(super) &'a Q);
 
-struct Packets<'a, Q>(&'a Q);
+pub(super) struct Packets<'a, Q: ?Sized>(pub(super) &'a Q);
 
-impl<Q: RayQuery> Contestant for Singles<'_, Q> {
+impl<Q: RayQuery + ?Sized> Contestant for Singles<'_, Q> {
     fn closest(&self, block: &RayBlock) -> HitBlock {
         HitBlock::from_fn(block.active(), |lane| self.0.intersect(&block.get(lane)))
     }
@@ -208,7 +208,7 @@ impl<Q: RayQuery> Contestant for Singles<'_, Q> {
     }
 }
 
-impl<Q: RayQuery> Contestant for Packets<'_, Q> {
+impl<Q: RayQuery + ?Sized> Contestant for Packets<'_, Q> {
     fn closest(&self, block: &RayBlock) -> HitBlock {
         self.0.intersect_block(block)
     }
