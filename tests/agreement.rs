@@ -100,7 +100,7 @@ fn compared(mesh: TriangleMesh, seed: u64, check: impl Fn(&str, Aim, Agreement))
 
     let mut random = Random(seed);
     for aim in [Aim::Box, Aim::Surface, Aim::Edges, Aim::Axes] {
-        let n = if common::verify() { 4000 } else { 40 };
+        let n = if common::verify() { 4000 } else { 200 };
         let exactly = (TESTS / LANES / triangles).min(n);
         let some = blocks(&mut random, &scene, aim, n);
         for (name, row) in &rows {

@@ -122,7 +122,11 @@ fn print_speeds(report: &BenchReport, threads: usize) {
     for row in measured(report) {
         let speed = |kind| match row.speeds.iter().find(|s| s.kind == kind && s.threads == threads)
         {
-            Some(s) => format!("{:>8} (x{:>6})", digits(s.mrays), digits(s.ratio)),
+            // Too few to tell much.
+            Some(s) => {
+                let mark = if s.rays < 1000 { "*" } else { "" };
+                format!("{:>7}{mark:1} (x{:>6})", digits(s.mrays), digits(s.ratio))
+            }
             None => "-".to_owned(),
         };
         let speeds = RayKind::ALL.map(|kind| format!("{:>18}", speed(kind))).concat();

@@ -2,12 +2,13 @@
 
 use std::ops::AddAssign;
 
+use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::rays::RayKind;
 use super::structures::{Contestant, Packets, Singles};
-use crate::accel::{Hit, LANES, RayBlock, RayQuery};
+use crate::accel::{Geometry, Hit, LANES, RayBlock, RayQuery, affine_from_rows};
 use crate::math::Ray;
 use crate::scene::Scene;
 
@@ -135,24 +136,22 @@ impl Judge<'_> {
         for lane in block.lanes() {
             sum.rays += 1;
             let ray = block.get(lane);
+            let expected = known.hits[lane].as_ref();
             let (verdict, got) = match &hits {
-                None => {
-                    let verdict = match (known.occluded >> lane & 1, bits >> lane & 1) {
-                        (1, 0) => Verdict::Missing,
-                        (0, 1) => Verdict::Extra,
-                        _ => Verdict::Same,
-                    };
-                    (verdict, None)
-                }
+                None => match (known.occluded >> lane & 1, bits >> lane & 1) {
+                    (1, 0) => (Verdict::Missing, None),
+                    (0, 1) => (Verdict::Extra, closest(row, &ray)),
+                    _ => (Verdict::Same, None),
+                },
                 Some(hits) => {
-                    let got = hits.get(lane);
-                    (self.verdict(&ray, known.hits[lane].as_ref(), got), got)
+                    let got = hits.get(lane).copied();
+                    (self.verdict(&ray, expected, got.as_ref()), got)
                 }
             };
             let count = match verdict {
                 Verdict::Same => continue,
                 Verdict::Tie => &mut sum.ties,
-                _ if self.is_at_edge(&ray, got, bits >> lane & 1 == 1) => &mut sum.edges,
+                _ if self.is_at_edge(&ray, &verdict, expected, got.as_ref()) => &mut sum.edges,
                 Verdict::Missing => &mut sum.missing,
                 Verdict::Extra => &mut sum.extra,
                 Verdict::Differing => &mut sum.differing,
@@ -189,9 +188,22 @@ impl Judge<'_> {
         (4.0 * point.error + 16.0 * f32::EPSILON * way + aside) / cosine
     }
 
-    /// Whether the reference gives the answer too for one of four rays close by.
-    fn is_at_edge(&self, ray: &Ray, got: Option<&Hit>, got_occluded: bool) -> bool {
+    /// Whether the reference gives the answer too for one of four rays close by, or missed a triangle, a
+    /// needle perhaps, by so little that a hit is right too.
+    fn is_at_edge(
+        &self,
+        ray: &Ray,
+        verdict: &Verdict,
+        expected: Option<&Hit>,
+        got: Option<&Hit>,
+    ) -> bool {
         let by = 32.0 * f32::EPSILON * (ray.origin.abs().max_element() + self.reach);
+        if let Some(got) = got
+            && expected.is_none_or(|expected| got.t < expected.t)
+            && self.passes(ray, got).is_some_and(|distance| distance <= f64::from(by))
+        {
+            return true;
+        }
         let (a, b) = ray.direction.any_orthonormal_pair();
         let mut block = RayBlock::empty();
         for (lane, side) in [a, -a, b, -b].into_iter().enumerate() {
@@ -199,7 +211,8 @@ impl Judge<'_> {
         }
         if self.kind == RayKind::Shadow {
             let bits = self.reference.occluded(&block);
-            return if got_occluded { bits != 0 } else { bits != block.active() };
+            let is_extra = matches!(verdict, Verdict::Extra);
+            return if is_extra { bits != 0 } else { bits != block.active() };
         }
         let hits = self.reference.closest(&block);
         block.lanes().any(|lane| match (hits.get(lane), got) {
@@ -208,6 +221,41 @@ impl Judge<'_> {
             _ => false,
         })
     }
+
+    /// How far the ray passes from the rim of the triangle that it is said to hit, where it crosses the plane
+    /// of it, in f64. None where it does not cross it between its ends, as for a false hit of the surface
+    /// that it leaves, and for other shapes.
+    fn passes(&self, ray: &Ray, hit: &Hit) -> Option<f64> {
+        let world = self.scene.world();
+        let group = world.group(hit.copy);
+        let Geometry::Mesh(mesh) = &group.geometries[hit.geometry as usize] else { return None };
+        let mut corners = mesh.corners(hit.primitive as usize).map(|p| p.as_dvec3());
+        if let Some(copy) = hit.copy {
+            let world_from_object = affine_from_rows(world.transform(copy));
+            corners = corners.map(|p| world_from_object.transform_point3(p));
+        }
+        let [a, b, c] = corners;
+        let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let n = (b - a).cross(c - a);
+        let t = n.dot(a - o) / n.dot(d);
+        if !(t > f64::from(ray.t_min) && t <= f64::from(ray.t_max)) {
+            return None;
+        }
+        let p = o + d * t;
+        let to_edge = |a: DVec3, b: DVec3| {
+            let (along, to) = (b - a, p - a);
+            let place = (to.dot(along) / along.length_squared()).clamp(0.0, 1.0);
+            to.distance(along * place)
+        };
+        Some(to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a)))
+    }
+}
+
+/// The closest hit of one ray.
+fn closest(row: &dyn Contestant, ray: &Ray) -> Option<Hit> {
+    let mut block = RayBlock::empty();
+    block.set(0, ray);
+    row.closest(&block).get(0).copied()
 }
 
 fn who(hit: &Hit) -> (Option<crate::accel::CopyRef>, u32, u32) {

@@ -107,7 +107,7 @@ fn chart(title: &str, rows: &[Bars]) -> String {
     let height: f64 = rows.iter().map(|r| r.bars.len() as f64 * BAR + 8.0).sum();
     let mut svg = String::new();
     if !title.is_empty() {
-        let _ = write!(svg, "<figure><figcaption>{title}</figcaption>\n");
+        let _ = writeln!(svg, "<figure><figcaption>{title}</figcaption>");
     }
     let _ = writeln!(
         svg,

@@ -157,7 +157,9 @@ pub(super) fn spread(n: usize, wanted: usize, length: usize) -> Vec<Range<usize>
         return (0..n).step_by(length).map(|start| start..(start + length).min(n)).collect();
     }
     let runs = (wanted / length).max(1);
-    (0..runs).map(|i| i * n / runs).map(|start| start..(start + length).min(n)).collect()
+    // In the middle of equal parts: the first alone would show the sky.
+    let aside = (n / runs).saturating_sub(length) / 2;
+    (0..runs).map(|i| i * n / runs + aside).map(|start| start..(start + length).min(n)).collect()
 }
 
 #[cfg(test)]
@@ -167,8 +169,9 @@ mod tests {
     #[test]
     fn runs_are_spread_without_overlap() {
         assert_eq!(spread(10, 100, 4), [0..4, 4..8, 8..10]);
-        assert_eq!(spread(100, 20, 5), [0..5, 25..30, 50..55, 75..80]);
+        assert_eq!(spread(100, 20, 5), [10..15, 35..40, 60..65, 85..90]);
         assert_eq!(spread(7, 3, 1), [0..1, 2..3, 4..5]);
+        assert_eq!(spread(100, 2, 1), [24..25, 74..75]);
         assert!(spread(0, 5, 4).is_empty());
     }
 
