@@ -102,9 +102,10 @@ fn chart(title: &str, rows: &[Bars]) -> String {
     const LEFT: f64 = 150.0;
     const RIGHT: f64 = 150.0;
     const BAR: f64 = 12.0;
+    const TOP: f64 = 4.0;
     let largest = rows.iter().flat_map(|r| &r.bars).map(|(x, _)| *x).fold(0.0, f64::max);
     let scale = (WIDTH - LEFT - RIGHT) / if largest > 0.0 { largest } else { 1.0 };
-    let height: f64 = rows.iter().map(|r| r.bars.len() as f64 * BAR + 8.0).sum();
+    let height: f64 = TOP + rows.iter().map(|r| r.bars.len() as f64 * BAR + 8.0).sum::<f64>();
     let mut svg = String::new();
     if !title.is_empty() {
         let _ = writeln!(svg, "<figure><figcaption>{title}</figcaption>");
@@ -113,7 +114,7 @@ fn chart(title: &str, rows: &[Bars]) -> String {
         svg,
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\">"
     );
-    let mut y = 0.0;
+    let mut y = TOP;
     for row in rows {
         let middle = y + 0.5 * BAR * row.bars.len() as f64 + 4.0;
         let name = escaped(&row.name);
@@ -179,6 +180,7 @@ fn short(x: f64) -> String {
     match x {
         x if x >= 100.0 => format!("{x:.0}"),
         x if x >= 0.1 => format!("{x:.2}"),
+        x if x >= 0.001 => format!("{x:.3}"),
         x => format!("{x:.1e}"),
     }
 }
