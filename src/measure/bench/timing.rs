@@ -13,7 +13,7 @@ use super::{BenchError, BenchOptions, Progress};
 use crate::accel::RayBlock;
 use crate::render::Observer;
 
-/// Blocks that one thread traces before it looks for more.
+/// Blocks that one thread traces before it looks for more, at most.
 const RUN: usize = 64;
 
 /// How fast rays of a kind are answered.
@@ -68,7 +68,8 @@ pub(super) fn race(
         let per_block = probe(*contestant, kind, blocks, pool, work.observer);
         let wanted = (seconds / options.rounds as f64 / per_block) as usize;
         let wanted = wanted.max(threads);
-        let length = (wanted / (8 * threads)).clamp(1, RUN);
+        // Many short runs, as some parts of a picture cost a hundred times as much as others.
+        let length = (wanted / 256).clamp(1, RUN);
         let runs = spread(blocks.len(), wanted, length);
         let rays = runs.iter().map(|run| Rays::count(&blocks[run.clone()])).sum();
         Lane { runs, rays, rates: Vec::new(), seconds: 0.0 }
