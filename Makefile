@@ -32,7 +32,7 @@ bench: setup ## Measures ray queries, the variants, every option, and other rend
 
 lint: setup ## Formatting, clippy and documentation without warnings
 	$(CARGO) fmt --check
-	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --all-targets --features crates -- -D warnings
 	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
 

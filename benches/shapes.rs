@@ -356,8 +356,8 @@ fn instances() -> String {
     let places: Vec<DAffine3> = (0..COUNT).map(|_| random.place(0.004)).collect();
     let array = copies(Geometry::Mesh(mesh.clone()), &places);
     let rows = [
-        ours("one instance array", &array, COUNT, COUNT * 48),
-        bare("single instances", COUNT, 0, |device, builder| {
+        ours("ours, in boxes that fit", &array, COUNT, COUNT * 48),
+        bare("Embree's instances", COUNT, 0, |device, builder| {
             let (flags, quality) = (embree::SceneFlags::ROBUST, embree::Quality::Medium);
             let triangles = Arc::clone(&mesh.triangles);
             let positions = mesh.positions.shared();

@@ -265,9 +265,9 @@ fn blocks_agree_with_single_rays() {
     assert!(different <= 2, "{different} lanes named another primitive");
 }
 
-/// More copies than single instances are made for: an instance array, with the same hits.
+/// Copies that stand side by side are told apart.
 #[test]
-fn many_copies_become_an_array_with_the_same_hits() {
+fn many_copies_are_told_apart() {
     let mut random = Random(77);
     let prototype = Group {
         geometries: vec![Geometry::Mesh(ball(4, DVec3::ZERO, 0.4, 0.1))],

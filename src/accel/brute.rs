@@ -2,9 +2,10 @@
 
 use glam::{DAffine3, DVec3};
 
+use super::primitive::{Found, Line, hit_shape, hit_triangle};
 use super::world::{CopyRef, Geometry, Group, World, affine_from_rows};
 use super::{AccelInfo, Hit, RayQuery};
-use crate::geometry::{AnalyticShape, intersect_triangle, with_shapes};
+use crate::geometry::{AnalyticShape, with_shapes};
 use crate::math::{Bounds, Ray};
 
 /// The oracle: no hierarchy; boxes around whole geometries only.
@@ -64,22 +65,21 @@ impl BruteForce {
         &self,
         ray: &Ray,
         passes: impl Fn(&Part) -> bool,
-        mut found: impl FnMut(f64, f64, f64, [u32; 2], Option<CopyRef>) -> f64,
+        mut found: impl FnMut(Found, [u32; 2], Option<CopyRef>) -> f64,
     ) {
-        let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-        let (t_min, mut t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
-        let mut visit = |parts: &[Part], o: DVec3, d: DVec3, copy: Option<CopyRef>| {
+        let mut t_max = f64::from(ray.t_max);
+        let mut visit = |parts: &[Part], line: &Line, copy: Option<CopyRef>| {
             for (geometry, part) in (0u32..).zip(parts).filter(|(_, part)| !passes(part)) {
-                part.visit(o, d, t_min, &mut t_max, |t, u, v, primitive| {
-                    found(t, u, v, [geometry, primitive], copy)
+                part.visit(line, &mut t_max, |hit, primitive| {
+                    found(hit, [geometry, primitive], copy)
                 });
             }
         };
-        visit(&self.root, o, d, None);
+        let line = Line::new(ray);
+        visit(&self.root, &line, None);
         for copy in &self.copies {
-            let m = &copy.object_from_world;
-            let (o, d) = (m.transform_point3(o), m.transform_vector3(d));
-            visit(&self.prototypes[copy.prototype], o, d, Some(copy.id));
+            let line = line.transformed(&copy.object_from_world);
+            visit(&self.prototypes[copy.prototype], &line, Some(copy.id));
         }
     }
 }
@@ -88,7 +88,7 @@ impl BruteForce {
     /// Whether the ray hits anything but parts that it passes.
     fn hits_any(&self, ray: &Ray, passes: impl Fn(&Part) -> bool) -> bool {
         let mut any = false;
-        self.visit(ray, passes, |_, _, _, _, _| {
+        self.visit(ray, passes, |_, _, _| {
             any = true;
             // Nothing is nearer than nothing: every further test fails at once.
             f64::NEG_INFINITY
@@ -107,28 +107,20 @@ impl Part {
         Self { geometry: geometry.clone(), is_clear, bounds }
     }
 
-    fn visit(
-        &self,
-        o: DVec3,
-        d: DVec3,
-        t_min: f64,
-        t_max: &mut f64,
-        mut found: impl FnMut(f64, f64, f64, u32) -> f64,
-    ) {
-        if self.bounds.clip(o, d).is_none() {
+    fn visit(&self, ray: &Line, t_max: &mut f64, mut found: impl FnMut(Found, u32) -> f64) {
+        if self.bounds.clip(ray.origin, ray.direction).is_none() {
             return;
         }
         match &self.geometry {
             Geometry::Mesh(mesh) => {
                 for i in 0..mesh.triangles.len() {
-                    let corners = mesh.corners(i).map(|p| p.as_dvec3());
-                    if let Some(h) = intersect_triangle(corners, o, d, t_min, *t_max) {
-                        *t_max = found(h.t, h.u, h.v, i as u32);
+                    if let Some(hit) = hit_triangle(mesh, i, ray, *t_max) {
+                        *t_max = found(hit, i as u32);
                     }
                 }
             }
             Geometry::Shapes(shapes) => {
-                with_shapes!(shapes, list => visit_each(list, o, d, t_min, t_max, found));
+                with_shapes!(shapes, list => visit_each(list, ray, t_max, found));
             }
         }
     }
@@ -136,15 +128,13 @@ impl Part {
 
 fn visit_each<S: AnalyticShape>(
     shapes: &[S],
-    o: DVec3,
-    d: DVec3,
-    t_min: f64,
+    ray: &Line,
     t_max: &mut f64,
-    mut found: impl FnMut(f64, f64, f64, u32) -> f64,
+    mut found: impl FnMut(Found, u32) -> f64,
 ) {
     for (i, shape) in (0u32..).zip(shapes) {
-        if let Some(hit) = shape.intersect(o, d, t_min, *t_max) {
-            *t_max = found(hit.t, Hit::u_of_part(hit.part).into(), 0.0, i);
+        if let Some(hit) = hit_shape(shape, ray, *t_max) {
+            *t_max = found(hit, i);
         }
     }
 }
@@ -155,10 +145,9 @@ impl RayQuery for BruteForce {
         self.visit(
             ray,
             |_| false,
-            |t, u, v, [geometry, primitive], copy| {
-                let (t32, u, v) = (t as f32, u as f32, v as f32);
-                closest = Some(Hit { t: t32, u, v, primitive, geometry, copy });
-                t
+            |hit, [geometry, primitive], copy| {
+                closest = Some(hit.named(geometry, primitive, copy));
+                hit.t
             },
         );
         closest

@@ -1,13 +1,19 @@
 //! The one seam for ray queries: what there is to hit goes in, hits come out. Embree on one side, a
-//! brute-force loop in f64 on the other, with the same answers.
+//! brute-force loop in f64 on the other, with the same answers; and plain trees to compare them with.
 //!
 //! It owns how rays are found to hit something, and decides which query suits which ray. It does not
 //! know what a hit looks like: materials, lights and normals are the scene's.
 
 mod block;
 mod brute;
+#[cfg(feature = "crates")]
+mod crates;
 #[cfg(feature = "embree")]
 mod embree;
+mod kdtree;
+mod levels;
+mod octree;
+mod primitive;
 #[cfg(feature = "embree")]
 mod reach;
 mod world;
@@ -17,8 +23,12 @@ use std::fmt;
 pub(crate) use block::lanes_of;
 pub use block::{HitBlock, LANES, RayBlock};
 pub use brute::BruteForce;
+#[cfg(feature = "crates")]
+pub use crates::{BvhCrate, CannotFlatten, Flat, ObvhsBvh2, ObvhsCwBvh};
 #[cfg(feature = "embree")]
 pub use embree::EmbreeAccel;
+pub use kdtree::KdTree;
+pub use octree::Octree;
 pub use world::{
     CopyRef, Geometry, Group, InstanceSet, Transform3x4, World, affine_from_rows, rows_from_affine,
 };
@@ -232,6 +242,18 @@ pub enum Accel {
     Brute(BruteForce),
 }
 
+/// Runs one expression over whichever structure was built, compiled for each.
+macro_rules! with_accel {
+    ($accel:expr, $query:ident => $body:expr) => {
+        match $accel {
+            #[cfg(feature = "embree")]
+            $crate::accel::Accel::Embree($query) => $body,
+            $crate::accel::Accel::Brute($query) => $body,
+        }
+    };
+}
+pub(crate) use with_accel;
+
 impl Accel {
     /// Builds the structure over `world`. `progress` hears of it from 0 to 1, perhaps on several
     /// threads at once, and ends the build by returning false.
@@ -251,13 +273,14 @@ impl Accel {
         }
     }
 
+    /// It behind dynamic dispatch, for tools and tests; a loop over rays that is to be fast matches once.
+    pub fn query(&self) -> &dyn RayQuery {
+        with_accel!(self, accel => accel)
+    }
+
     /// What was built.
     pub fn info(&self) -> AccelInfo {
-        match self {
-            #[cfg(feature = "embree")]
-            Self::Embree(accel) => accel.info(),
-            Self::Brute(accel) => accel.info(),
-        }
+        with_accel!(self, accel => accel.info())
     }
 }
 

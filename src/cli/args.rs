@@ -9,6 +9,7 @@ use super::units::{parse_bytes, parse_crop, parse_size};
 use crate::accel::{AccelKind, BuildQuality, Precision};
 use crate::film::{Filter, PixelRect};
 use crate::io::{ExrCompression, PixelType};
+use crate::measure::bench::StructureKind;
 use crate::scene::IntegratorKind;
 
 /// Alhazen: a scene or a bare mesh in, an HDR EXR picture out, fast, with a known error.
@@ -24,6 +25,7 @@ Start here:
   alhazen render scene.toml --size 640x360 --samples 4 --set camera.fov=30
   alhazen inspect scene.toml                  what it holds, what it requires, what it costs
   alhazen compare out.exr reference.exr       how far a picture is from a reference
+  alhazen bench bunny.ply --html bench.html   how fast and how right accelerators are on it
 
 Exit codes: 0 done, 1 the render failed or a comparison exceeded a limit, 2 bad input or usage, 130 interrupted
 (once rendering had begun, a valid picture is on disk).
@@ -42,6 +44,8 @@ pub(super) enum Command {
     Inspect(InspectArgs),
     /// Say how far a picture is from a reference (EXR or PNG): MSE, relMSE, PSNR, FLIP
     Compare(CompareArgs),
+    /// Measure accelerators on the rays of a scene: build time, memory, speed, agreement
+    Bench(BenchArgs),
 }
 
 /// What chooses and changes a scene.
@@ -88,11 +92,6 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "NAME", value_parser = by_name(&Filter::ALL, Filter::name))]
     pub(super) filter: Option<Filter>,
 
-    /// What answers ray queries; `brute` is an f64 loop over everything, for small scenes and comparison
-    #[arg(long, value_name = "NAME", default_value = AccelKind::ALL[0].name(),
-          value_parser = by_name(AccelKind::ALL, AccelKind::name))]
-    pub(super) accel: AccelKind,
-
     /// Threads; all of the machine's where not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
     pub(super) threads: Option<u16>,
@@ -106,10 +105,22 @@ pub(super) struct SceneArgs {
     pub(super) quiet: bool,
 }
 
+/// What answers ray queries.
+#[derive(Debug, clap::Args)]
+pub(super) struct AccelArgs {
+    /// What answers ray queries; `brute` is an f64 loop over everything, for small scenes and comparison
+    #[arg(id = "accel", long, value_name = "NAME", default_value = AccelKind::ALL[0].name(),
+          value_parser = by_name(AccelKind::ALL, AccelKind::name))]
+    pub(super) kind: AccelKind,
+}
+
 #[derive(Debug, clap::Args)]
 pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) scene: SceneArgs,
+
+    #[command(flatten)]
+    pub(super) accel: AccelArgs,
 
     /// File to write, .exr or .png; repeatable. Without it: the scene's name with .exr, in this folder
     #[arg(long, short, value_name = "FILE")]
@@ -146,6 +157,9 @@ pub(super) struct RenderArgs {
 pub(super) struct InspectArgs {
     #[command(flatten)]
     pub(super) scene: SceneArgs,
+
+    #[command(flatten)]
+    pub(super) accel: AccelArgs,
 }
 
 #[derive(Debug, clap::Args)]
@@ -199,6 +213,57 @@ pub(super) struct CompareArgs {
     /// No table: only errors and exceeded limits
     #[arg(long, short)]
     pub(super) quiet: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Rays are recorded from the scene: those of the camera for one sample of the picture (--size), and a shadow, a \
+reflection and a diffuse ray from each first hit. Ratios are to the first accelerator, in the same rounds; \
+slow ones trace fewer rays. What is measured, and what the columns mean, is told in docs/bench.md.")]
+pub(super) struct BenchArgs {
+    #[command(flatten)]
+    pub(super) scene: SceneArgs,
+
+    /// Accelerator to measure, beside the first; repeatable. Without it: all
+    #[arg(long, value_name = "NAME", value_parser = structure())]
+    pub(super) accel: Vec<StructureKind>,
+
+    /// Seconds for which each traces rays, about; its builds and checks take as long again, and longer where
+    /// one build does
+    #[arg(long, value_name = "S", default_value_t = 4.0, value_parser = parse_seconds)]
+    pub(super) seconds: f64,
+
+    /// Rounds of which medians are taken
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub(super) rounds: u16,
+
+    /// Rays of each kind, at most: of a larger picture some tiles are taken
+    #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = clap::value_parser!(u32).range(1024..=1 << 26))]
+    pub(super) rays: u32,
+
+    /// Write what was measured as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) json: Option<PathBuf>,
+
+    /// Write it as a page with bar charts, which needs nothing else
+    #[arg(long, value_name = "FILE.html")]
+    pub(super) html: Option<PathBuf>,
+}
+
+/// A parser of one of the structures that can be measured.
+fn structure() -> impl TypedValueParser<Value = StructureKind> {
+    let names = StructureKind::all().into_iter().map(StructureKind::name);
+    PossibleValuesParser::new(names).map(|text| {
+        let found = StructureKind::all().into_iter().find(|kind| kind.name() == text);
+        found.unwrap_or_else(|| unreachable!("the parser accepts these names only"))
+    })
+}
+
+/// A time in seconds.
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let text = text.trim().trim_end_matches('s');
+    let seconds = text.parse().ok().filter(|x: &f64| *x > 0.0 && *x <= 86_400.0);
+    seconds.ok_or_else(|| "expected a number of seconds, more than 0, at most 86400".to_owned())
 }
 
 /// A limit of a metric.

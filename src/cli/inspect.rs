@@ -10,6 +10,7 @@ use crate::scene::{IntegratorKind, Scene};
 
 /// Loads and builds the scene, and prints what it finds.
 pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
+    let kind = args.accel.kind;
     let args = &args.scene;
     super::progress::catch_interrupts();
     let clock = Instant::now();
@@ -17,7 +18,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
     let read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
     let clock = Instant::now();
-    let scene = job::thread_pool(args)?.install(|| job::build(args, loaded))?;
+    let scene = job::thread_pool(args)?.install(|| job::build(args, kind, loaded))?;
     let build = clock.elapsed().as_secs_f64();
 
     let info = scene.accel.info();

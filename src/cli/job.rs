@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::args::{RenderArgs, SceneArgs};
 use super::progress::{Progress, catch_interrupts, interrupted};
 use super::{Failure, Outcome, print, report, tell};
-use crate::accel::{AccelError, BuildOptions};
+use crate::accel::{AccelError, AccelKind, BuildOptions};
 use crate::film::PixelRect;
 use crate::io::{
     ExrOptions, LoadOptions, LoadedScene, PixelType, WriteError, check_writable, load_scene,
@@ -59,7 +59,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     check_memory(&crop.unwrap_or(PixelRect::whole(size)))?;
 
     let clock = Instant::now();
-    let scene = pool.install(|| build(&args.scene, loaded))?;
+    let scene = pool.install(|| build(&args.scene, args.accel.kind, loaded))?;
     phases.build = clock.elapsed().as_secs_f64();
 
     let job = RenderJob { crop, seed: args.seed, variant: None };
@@ -138,7 +138,7 @@ pub(super) fn load(args: &SceneArgs) -> Result<LoadedScene, Failure> {
 
 /// Finds out before any work that every file could be written, and that none is written twice or over
 /// the scene.
-fn check_targets<'a>(
+pub(super) fn check_targets<'a>(
     scene: &Path,
     targets: impl Iterator<Item = &'a PathBuf>,
 ) -> Result<(), Failure> {
@@ -181,9 +181,13 @@ fn check_memory(window: &PixelRect) -> Result<(), Failure> {
 }
 
 /// Builds the scene, showing progress.
-pub(super) fn build(args: &SceneArgs, loaded: LoadedScene) -> Result<Scene, Failure> {
+pub(super) fn build(
+    args: &SceneArgs,
+    kind: AccelKind,
+    loaded: LoadedScene,
+) -> Result<Scene, Failure> {
     let options = BuildOptions {
-        kind: args.accel,
+        kind,
         threads: args.threads.map(usize::from),
         memory_limit: args.memory_limit,
         ..BuildOptions::default()

@@ -5,6 +5,7 @@
 //! interrupted with a valid picture on disk.
 
 mod args;
+mod bench;
 mod compare;
 mod inspect;
 mod job;
@@ -77,6 +78,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Command::Render(args) => job::render(&args, start),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Compare(args) => compare::compare(&args),
+        Command::Bench(args) => bench::bench(&args),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::accel::{Accel, LANES, RayBlock, RayQuery};
+use crate::accel::{LANES, RayBlock, RayQuery, with_accel};
 use crate::film::{BLOCK_LANES, BlockAccumulator, Film, FilterTable, PixelRect};
 use crate::integrator::{
     Ao, CameraBlock, Everything, Flat, Integrator, Local, RayCounts, Tree, Whitted,
@@ -84,11 +84,7 @@ pub struct NonFinite {
 /// in a hierarchy built at low quality).
 pub fn render(scene: &Scene, job: &RenderJob, observer: &dyn Observer) -> Rendered {
     // Static dispatch from here on: one loop of those that are compiled is run.
-    match &scene.accel {
-        #[cfg(feature = "embree")]
-        Accel::Embree(query) => choose(scene, query, job, observer),
-        Accel::Brute(query) => choose(scene, query, job, observer),
-    }
+    with_accel!(&scene.accel, query => choose(scene, query, job, observer))
 }
 
 fn choose<Q: RayQuery>(

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::build::Scene;
-use crate::accel::{Accel, RayQuery};
+use crate::accel::{RayQuery, with_accel};
 use crate::material::{Dielectric, Ior, Material};
 use crate::math::Ray;
 use crate::medium::Interior;
@@ -47,11 +47,7 @@ impl Scene {
     /// The media that the point `p` lies in: those whose surface a ray from there leaves without having
     /// entered.
     pub(super) fn interior_at(&self, p: DVec3) -> Interior {
-        match &self.accel {
-            #[cfg(feature = "embree")]
-            Accel::Embree(query) => self.interior_by(query, p),
-            Accel::Brute(query) => self.interior_by(query, p),
-        }
+        with_accel!(&self.accel, query => self.interior_by(query, p))
     }
 
     fn interior_by<Q: RayQuery>(&self, query: &Q, p: DVec3) -> Interior {
