@@ -1,11 +1,12 @@
-//! The one seam for ray queries: what there is to hit goes in, hits come out. Embree on one side, a
-//! brute-force loop in f64 on the other, with the same answers.
+//! The one seam for ray queries: what there is to hit goes in, hits come out. Behind it are Embree, a
+//! hierarchy of our own and a brute-force loop in f64, with the same answers.
 //!
 //! It owns how rays are found to hit something, and decides which query suits which ray. It does not
 //! know what a hit looks like: materials, lights and normals are the scene's.
 
 mod block;
 mod brute;
+mod bvh;
 #[cfg(feature = "embree")]
 mod embree;
 mod world;
@@ -14,6 +15,7 @@ use std::fmt;
 
 pub use block::{HitBlock, LANES, RayBlock};
 pub use brute::BruteForce;
+pub use bvh::BvhAccel;
 #[cfg(feature = "embree")]
 pub use embree::EmbreeAccel;
 pub use world::{
@@ -144,6 +146,8 @@ pub enum AccelKind {
     /// Embree 4.
     #[cfg(feature = "embree")]
     Embree,
+    /// Our own hierarchy, eight wide.
+    Bvh,
     /// Every ray against every primitive, in f64: the oracle, for small scenes.
     Brute,
 }
@@ -153,6 +157,7 @@ impl AccelKind {
     pub const ALL: &[Self] = &[
         #[cfg(feature = "embree")]
         Self::Embree,
+        Self::Bvh,
         Self::Brute,
     ];
 
@@ -161,6 +166,7 @@ impl AccelKind {
         match self {
             #[cfg(feature = "embree")]
             Self::Embree => "embree",
+            Self::Bvh => "bvh",
             Self::Brute => "brute",
         }
     }
@@ -217,6 +223,9 @@ pub enum AccelError {
         /// The limit.
         limit: u64,
     },
+    /// More than can be numbered.
+    #[error("a group of more than 2³² − 2 triangles, or of 2³⁰ shapes and copies, cannot be built over")]
+    TooMany,
 }
 
 /// An acceleration structure that was built. Match on it once, outside the loop over rays.
@@ -225,6 +234,8 @@ pub enum Accel {
     /// Embree 4.
     #[cfg(feature = "embree")]
     Embree(EmbreeAccel),
+    /// Our own hierarchy.
+    Bvh(BvhAccel),
     /// Every ray against every primitive.
     Brute(BruteForce),
 }
@@ -243,6 +254,7 @@ impl Accel {
         match options.kind {
             #[cfg(feature = "embree")]
             AccelKind::Embree => EmbreeAccel::build(world, options, progress).map(Self::Embree),
+            AccelKind::Bvh => BvhAccel::build(world, options, progress).map(Self::Bvh),
             AccelKind::Brute if !progress(0.0) => Err(AccelError::Interrupted),
             AccelKind::Brute => Ok(Self::Brute(BruteForce::new(world))),
         }
@@ -253,6 +265,7 @@ impl Accel {
         match self {
             #[cfg(feature = "embree")]
             Self::Embree(accel) => accel.info(),
+            Self::Bvh(accel) => accel.info(),
             Self::Brute(accel) => accel.info(),
         }
     }

@@ -87,6 +87,7 @@ pub fn render(scene: &Scene, job: &RenderJob, observer: &dyn Observer) -> Render
     match &scene.accel {
         #[cfg(feature = "embree")]
         Accel::Embree(query) => choose(scene, query, job, observer),
+        Accel::Bvh(query) => choose(scene, query, job, observer),
         Accel::Brute(query) => choose(scene, query, job, observer),
     }
 }

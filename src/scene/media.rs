@@ -50,6 +50,7 @@ impl Scene {
         match &self.accel {
             #[cfg(feature = "embree")]
             Accel::Embree(query) => self.interior_by(query, p),
+            Accel::Bvh(query) => self.interior_by(query, p),
             Accel::Brute(query) => self.interior_by(query, p),
         }
     }
