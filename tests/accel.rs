@@ -6,8 +6,8 @@
 use std::sync::Arc;
 
 use alhazen::accel::{
-    Accel, AccelKind, BruteForce, BuildOptions, Geometry, Group, Hit,
-    InstanceSet, LANES, Precision, RayBlock, RayQuery, World, affine_from_rows, rows_from_affine,
+    Accel, AccelKind, BruteForce, BuildOptions, Geometry, Group, Hit, InstanceSet, LANES,
+    Precision, RayBlock, RayQuery, World, affine_from_rows, rows_from_affine,
 };
 use alhazen::geometry::{Cone, Cuboid, Framed, Sphere, Torus, TriangleMesh};
 use alhazen::math::{Bounds, Ray};

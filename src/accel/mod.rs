@@ -224,7 +224,9 @@ pub enum AccelError {
         limit: u64,
     },
     /// More than can be numbered.
-    #[error("a group of more than 2³² − 2 triangles, or of 2³⁰ shapes and copies, cannot be built over")]
+    #[error(
+        "a group of more than 2³² − 2 triangles, or of 2³⁰ shapes and copies, cannot be built over"
+    )]
     TooMany,
 }
 

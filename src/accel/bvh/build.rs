@@ -138,7 +138,9 @@ pub(super) fn build(
     let builder = Builder { bins: bins.clamp(4, BINS), watch };
     let Subtree { nodes, leaves } = builder.subtree(whole, 0);
     watch.check()?;
-    let bytes = size_of_val(&nodes[..]) + size_of_val(&leaves[..]) + leaves.len() * size_of::<TriangleBlock>();
+    let bytes = size_of_val(&nodes[..])
+        + size_of_val(&leaves[..])
+        + leaves.len() * size_of::<TriangleBlock>();
     watch.reserve(refs_bytes + bytes as u64)?;
     let block = |leaf: &Leaf| {
         let refs = &refs[leaf.start as usize..][..leaf.len as usize];
@@ -259,9 +261,8 @@ impl Builder<'_> {
                 _ => part.refs.len() as f32,
             };
             let candidates = parts.iter().enumerate().filter(|(_, part)| !part.is_leaf());
-            let Some((largest, _)) = candidates
-                .map(|(i, part)| (i, size(part)))
-                .max_by(|a, b| a.1.total_cmp(&b.1))
+            let Some((largest, _)) =
+                candidates.map(|(i, part)| (i, size(part))).max_by(|a, b| a.1.total_cmp(&b.1))
             else {
                 break;
             };
@@ -426,10 +427,7 @@ impl Side {
     }
 
     fn union(self, other: Self) -> Self {
-        Self {
-            bounds: self.bounds.union(other.bounds),
-            centers: self.centers.union(other.centers),
-        }
+        Self { bounds: self.bounds.union(other.bounds), centers: self.centers.union(other.centers) }
     }
 }
 
@@ -464,9 +462,8 @@ impl Split {
         let pieces: Vec<(usize, [Side; 2])> =
             refs.par_chunks_mut(CHUNK).map(|chunk| self.partition(chunk)).collect();
         let middle = pieces.iter().map(|(left, _)| left).sum();
-        let sides = pieces.iter().fold([Side::EMPTY; 2], |[a, b], (_, [c, d])| {
-            [a.union(*c), b.union(*d)]
-        });
+        let sides =
+            pieces.iter().fold([Side::EMPTY; 2], |[a, b], (_, [c, d])| [a.union(*c), b.union(*d)]);
         let n = refs.len();
         let piece = |i: usize| (i * CHUNK, i * CHUNK + pieces[i].0, n.min((i + 1) * CHUNK));
         // Stretches of the right side in front of the middle, and of the left one behind it.

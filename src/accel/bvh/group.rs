@@ -78,11 +78,11 @@ impl GroupTree {
         };
         for (i, geometry) in group.geometries.iter().enumerate() {
             match geometry {
-                Geometry::Mesh(mesh) => refs.par_extend(
-                    (0..mesh.triangles.len())
-                        .into_par_iter()
-                        .map(|t| Reference::triangle(first_primitives[i] + t as u32, mesh.corners(t))),
-                ),
+                Geometry::Mesh(mesh) => {
+                    refs.par_extend((0..mesh.triangles.len()).into_par_iter().map(|t| {
+                        Reference::triangle(first_primitives[i] + t as u32, mesh.corners(t))
+                    }))
+                }
                 Geometry::Shapes(shapes) => with_shapes!(shapes, list => {
                     let boxes = (first_items[i]..).zip(list.iter());
                     refs.extend(boxes.filter_map(|(item, shape)| add(item, &shape.bounds())));
@@ -297,13 +297,7 @@ fn intersect_shape(group: &GroupTree, item: u32, ray: &Ray) -> Option<Found> {
         list[index as usize].intersect(o, d, ray.t_min.into(), ray.t_max.into())
     })?;
     let id = group.first_primitives[geometry] + index;
-    Some(Found {
-        t: hit.t as f32,
-        u: Hit::u_of_part(hit.part),
-        v: 0.0,
-        id,
-        copy: Found::NO_COPY,
-    })
+    Some(Found { t: hit.t as f32, u: Hit::u_of_part(hit.part), v: 0.0, id, copy: Found::NO_COPY })
 }
 
 #[inline(never)]

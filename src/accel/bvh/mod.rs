@@ -239,7 +239,8 @@ impl<const ROBUST: bool> Kernel for ClosestOfBlock<'_, ROBUST> {
             });
         };
         let tree = &accel.root.tree;
-        let best = packet::closest::<S, ROBUST>(simd, tree, accel.items::<ROBUST>(), rays, &mut packet);
+        let best =
+            packet::closest::<S, ROBUST>(simd, tree, accel.items::<ROBUST>(), rays, &mut packet);
         HitBlock::from_fn(rays.active(), |lane| best[lane].if_any().map(|found| accel.hit(&found)))
     }
 }

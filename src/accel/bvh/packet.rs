@@ -1,18 +1,17 @@
 //! Sixteen rays that run close together through a tree.
 //!
 //! A node's eight boxes are tested at once against all that the rays could be: intervals of origins and
-//! reciprocal directions. Source: Boulos et al., *Interval arithmetic for ray packets* (Wald, Boulos,
-//! Shirley, *Ray tracing deformable scenes using dynamic bounding volume hierarchies*, TOG 26(1), 2007). At a
-//! leaf, its box is tested against the sixteen rays, and each that meets it is tested as a single ray is:
-//! with the same results to the last bit.
+//! reciprocal directions. Source: Wald, Boulos, Shirley, *Ray tracing deformable scenes using dynamic
+//! bounding volume hierarchies*, TOG 26(1), 2007. The box of what is visited next is tested against the
+//! sixteen rays; at a leaf, each that meets it is tested as a single ray is: with the same results to the
+//! last bit.
 
 use super::super::block::{LANES, RayBlock, lanes_of};
 use super::node::{Content, Node, Tree, WIDTH};
 use super::ray::RaySetup;
 use super::simd::{Floats, Simd, Stack};
-use super::traverse::{Found, Items, STACK};
+use super::traverse::{Found, Items, STACK, ask};
 use super::triangle::ShearRay;
-use crate::math::Ray;
 
 /// The rays of a block whose directions have the same signs.
 pub(super) struct Packet {
@@ -45,7 +44,7 @@ impl Packet {
             t_max: [f32::NEG_INFINITY; LANES],
             intervals: [[[0.0; 3]; 2]; 3],
             sign: [0; 3],
-            least_t: f32::INFINITY,
+            least_t: 0.0,
         };
         let mut sign = None;
         for lane in block.lanes() {
@@ -60,35 +59,39 @@ impl Packet {
             }
             packet.t_min[lane] = setup.t_min;
             packet.t_max[lane] = setup.t_max;
-            packet.least_t = packet.least_t.min(setup.t_min);
             packet.active |= 1 << lane;
             packet.rays[lane] = setup;
         }
         packet.sign = sign.unwrap_or_default();
-        let ends = |values: &[f32; LANES]| {
-            lanes_of(packet.active).fold([f32::INFINITY, f32::NEG_INFINITY], |[a, b], lane| {
-                [a.min(values[lane]), b.max(values[lane])]
-            })
-        };
-        packet.intervals = [0, 1, 2].map(|axis| {
-            let [lower, upper] = ends(&packet.origin[axis]);
-            let ([a, b], [c, d]) = (ends(&packet.near[axis]), ends(&packet.far[axis]));
-            match packet.sign[axis] {
-                0 => [[upper, a, b], [lower, c, d]],
-                _ => [[lower, a, b], [upper, c, d]],
+        // Lanes without a ray repeat one that is there.
+        let first = packet.active.trailing_zeros() as usize % LANES;
+        for lane in lanes_of(!packet.active) {
+            for axis in 0..3 {
+                packet.origin[axis][lane] = packet.origin[axis][first];
+                packet.near[axis][lane] = packet.near[axis][first];
+                packet.far[axis][lane] = packet.far[axis][first];
             }
-        });
+            packet.t_min[lane] = packet.t_min[first];
+        }
+        packet.least_t = least(&packet.t_min);
+        for axis in 0..3 {
+            let (near, far) = (&packet.near[axis], &packet.far[axis]);
+            let (lower, upper) = (least(&packet.origin[axis]), most(&packet.origin[axis]));
+            let ends = if packet.sign[axis] == 0 { [upper, lower] } else { [lower, upper] };
+            packet.intervals[axis] =
+                [[ends[0], least(near), most(near)], [ends[1], least(far), most(far)]];
+        }
         Some(packet)
     }
 
     /// The furthest that any ray goes.
     #[inline(always)]
     fn furthest(&self) -> f32 {
-        self.t_max.iter().fold(f32::NEG_INFINITY, |a, &b| if a > b { a } else { b })
+        most(&self.t_max)
     }
 
-    /// Calls `visit` for each child that may be met, nearest first, with the lanes that meet its box, until
-    /// it returns false.
+    /// Calls `visit` for each leaf that rays meet, the nearest first, with their lanes, until it returns
+    /// false.
     #[inline(always)]
     fn traverse<S: Simd>(
         &mut self,
@@ -99,8 +102,14 @@ impl Packet {
         if tree.nodes.is_empty() || self.active == 0 {
             return;
         }
-        let splat = |[x, y, z]: [f32; 3]| [simd.splat8(x), simd.splat8(y), simd.splat8(z)];
-        let intervals = self.intervals.map(|[near, far]| [splat(near), splat(far)]);
+        let mut intervals = [[[simd.splat8(0.0); 3]; 2]; 3];
+        for axis in 0..3 {
+            for side in 0..2 {
+                for end in 0..3 {
+                    intervals[axis][side][end] = simd.splat8(self.intervals[axis][side][end]);
+                }
+            }
+        }
         let least_t = simd.splat8(self.least_t);
         let sign = self.sign;
         let mut furthest = self.furthest();
@@ -108,18 +117,14 @@ impl Packet {
         let mut index = 0;
         loop {
             let node = &tree.nodes[index];
-            let enter = |axis: usize| {
-                let [origin, a, b] = intervals[axis][0];
-                let d = simd.load8(&node.planes[axis][sign[axis] & 1]).sub(origin);
-                d.mul(a).min(d.mul(b))
-            };
-            let exit = |axis: usize| {
-                let [origin, a, b] = intervals[axis][1];
-                let d = simd.load8(&node.planes[axis][sign[axis] & 1 ^ 1]).sub(origin);
-                d.mul(a).max(d.mul(b))
-            };
-            let near = enter(0).max(enter(1)).max(enter(2).max(least_t));
-            let far = exit(0).min(exit(1)).min(exit(2).min(simd.splat8(furthest)));
+            let (mut near, mut far) = (least_t, simd.splat8(furthest));
+            for axis in 0..3 {
+                let [[origin, a, b], [far_origin, c, d]] = intervals[axis];
+                let way = simd.load8(&node.planes[axis][sign[axis] & 1]).sub(origin);
+                near = near.max(way.mul(a).min(way.mul(b)));
+                let way = simd.load8(&node.planes[axis][sign[axis] & 1 ^ 1]).sub(far_origin);
+                far = far.min(way.mul(c).max(way.mul(d)));
+            }
             let mut bits = near.le(far);
             if bits != 0 {
                 let near = near.to_array();
@@ -141,35 +146,73 @@ impl Packet {
                 let (parent, lane) = ((entry as u32) as usize / WIDTH, entry as usize % WIDTH);
                 let node = &tree.nodes[parent];
                 let content = node.children[lane].content();
+                let lanes = self.lanes_that_meet(simd, node, lane);
+                if lanes == 0 {
+                    continue;
+                }
                 if let Content::Node(index) = content {
                     break index;
                 }
-                let lanes = self.lanes_that_meet(simd, node, lane);
-                if lanes != 0 {
-                    if !visit(self, content, lanes) {
-                        return;
-                    }
-                    furthest = self.furthest();
+                if !visit(self, content, lanes) {
+                    return;
                 }
+                furthest = self.furthest();
             };
         }
+    }
+
+    /// Where each ray passes the planes of a child that are entered (`side` 0) or left (1) by, by axis.
+    #[inline(always)]
+    fn lane_times<S: Simd>(
+        &self,
+        simd: S,
+        node: &Node,
+        child: usize,
+        reciprocals: &[[f32; LANES]; 3],
+        side: usize,
+    ) -> [S::F16; 3] {
+        let mut times = [simd.splat16(0.0); 3];
+        for axis in 0..3 {
+            let plane = simd.splat16(node.planes[axis][self.sign[axis] & 1 ^ side][child]);
+            let way = plane.sub(simd.load16(&self.origin[axis]));
+            times[axis] = way.mul(simd.load16(&reciprocals[axis]));
+        }
+        times
     }
 
     /// The rays that meet the box of a child.
     #[inline(always)]
     fn lanes_that_meet<S: Simd>(&self, simd: S, node: &Node, child: usize) -> u16 {
-        let near = |axis: usize| {
-            let plane = simd.splat16(node.planes[axis][self.sign[axis] & 1][child]);
-            plane.sub(simd.load16(&self.origin[axis])).mul(simd.load16(&self.near[axis]))
-        };
-        let far = |axis: usize| {
-            let plane = simd.splat16(node.planes[axis][self.sign[axis] & 1 ^ 1][child]);
-            plane.sub(simd.load16(&self.origin[axis])).mul(simd.load16(&self.far[axis]))
-        };
-        let enter = near(0).max(near(1)).max(near(2).max(simd.load16(&self.t_min)));
-        let exit = far(0).min(far(1)).min(far(2).min(simd.load16(&self.t_max)));
+        let near = self.lane_times(simd, node, child, &self.near, 0);
+        let far = self.lane_times(simd, node, child, &self.far, 1);
+        let enter = near[0].max(near[1]).max(near[2].max(simd.load16(&self.t_min)));
+        let exit = far[0].min(far[1]).min(far[2].min(simd.load16(&self.t_max)));
         enter.le(exit) as u16
     }
+}
+
+/// The least of the lanes, in halves, as the compiler makes lanes of it.
+#[inline(always)]
+fn least(values: &[f32; LANES]) -> f32 {
+    let mut v = *values;
+    for half in [8, 4, 2, 1] {
+        for i in 0..half {
+            v[i] = if v[i] < v[i + half] { v[i] } else { v[i + half] };
+        }
+    }
+    v[0]
+}
+
+/// The greatest of them.
+#[inline(always)]
+fn most(values: &[f32; LANES]) -> f32 {
+    let mut v = *values;
+    for half in [8, 4, 2, 1] {
+        for i in 0..half {
+            v[i] = if v[i] > v[i + half] { v[i] } else { v[i + half] };
+        }
+    }
+    v[0]
 }
 
 /// The closest hit of each ray, as [`super::traverse::closest`] finds it.
@@ -182,29 +225,22 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
     packet: &mut Packet,
 ) -> [Found; LANES] {
     let mut best = [Found::nothing(0.0); LANES];
-    let ask = |item: u32, lane: usize, packet: &mut Packet, best: &mut [Found; LANES]| {
-        let ray = Ray { t_max: best[lane].t, ..block.get(lane) };
-        if let Some(found) = items.intersect(simd, item, &ray)
-            && found.is_before(&best[lane])
-        {
-            best[lane] = found;
-            packet.t_max[lane] = found.t;
-        }
-    };
     for lane in lanes_of(packet.active) {
         best[lane] = Found::nothing(packet.t_max[lane]);
         for &item in &tree.endless {
-            ask(item, lane, packet, &mut best);
+            ask(simd, items, item, &block.get(lane), &mut best[lane]);
         }
+        packet.t_max[lane] = best[lane].t;
     }
     packet.traverse(simd, tree, |packet, content, lanes| {
-        match content {
-            Content::Triangles(index) => {
-                let triangles = &tree.blocks[index];
-                for lane in lanes_of(lanes) {
-                    let lane = lane % LANES;
+        for lane in lanes_of(lanes) {
+            let lane = lane % LANES;
+            let best = &mut best[lane];
+            match content {
+                Content::Node(_) => {}
+                Content::Triangles(index) => {
+                    let triangles = &tree.blocks[index];
                     let shear = ShearRay::new(simd, &packet.rays[lane]);
-                    let best = &mut best[lane];
                     shear.each_hit::<S, ROBUST>(simd, triangles, best.t, |i, hit| {
                         let found = Found::triangle(hit, triangles.ids[i]);
                         if found.is_before(best) {
@@ -212,13 +248,10 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
                         }
                         false
                     });
-                    packet.t_max[lane] = best.t;
                 }
+                Content::Item(item) => ask(simd, items, item, &block.get(lane), best),
             }
-            Content::Item(item) => {
-                lanes_of(lanes).for_each(|lane| ask(item, lane, packet, &mut best));
-            }
-            Content::Node(_) => {}
+            packet.t_max[lane] = best.t;
         }
         true
     });
@@ -248,21 +281,21 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
     packet.traverse(simd, tree, |packet, content, lanes| {
         for lane in lanes_of(lanes) {
             let lane = lane % LANES;
+            let (ray, setup) = (&block.get(lane), &packet.rays[lane]);
             let mut is_hit = false;
             match content {
+                Content::Node(_) => {}
                 Content::Triangles(index) => {
                     let triangles = &tree.blocks[index];
-                    let ray = &packet.rays[lane];
-                    let shear = ShearRay::new(simd, ray);
-                    shear.each_hit::<S, ROBUST>(simd, triangles, ray.t_max, |i, _| {
+                    let shear = ShearRay::new(simd, setup);
+                    shear.each_hit::<S, ROBUST>(simd, triangles, setup.t_max, |i, _| {
                         is_hit = !(OPAQUE && items.is_clear(triangles.ids[i]));
                         is_hit
                     });
                 }
                 Content::Item(item) => {
-                    is_hit = items.occluded::<S, OPAQUE>(simd, item, &block.get(lane));
+                    is_hit = items.occluded::<S, OPAQUE>(simd, item, ray);
                 }
-                Content::Node(_) => {}
             }
             if is_hit {
                 occluded |= 1 << lane;

@@ -19,6 +19,8 @@ pub(super) struct RaySetup {
     pub(super) axes: [usize; 3],
     /// By how much the first two grow along that one, and its reciprocal.
     pub(super) shear: [f32; 3],
+    /// The origin in the order of `axes`.
+    pub(super) pivot: [f32; 3],
 }
 
 /// How far slabs are widened, relative to the distance of their planes: three roundings in the plane's
@@ -37,6 +39,7 @@ impl RaySetup {
         t_max: 0.0,
         axes: [0, 1, 2],
         shear: [0.0; 3],
+        pivot: [0.0; 3],
     };
 
     /// None where nothing can be hit: a number is not finite, the direction is zero, the ray has no length.
@@ -55,7 +58,8 @@ impl RaySetup {
         // 0, 1, 2 → 1, 2, 0 → 2, 0, 1.
         let x = if z == 2 { 0 } else { z + 1 };
         let y = if z == 0 { 2 } else { z - 1 };
-        let (o, d) = (o.to_array(), d.to_array());
+        let pivot = o.to_array();
+        let (o, d) = ([o.x, o.y, o.z], d.to_array());
         let along = 1.0 / d[z];
         // A component of zero becomes so small a one that the ray is not seen to move, and reciprocals
         // stay finite: nothing is NaN.
@@ -64,7 +68,7 @@ impl RaySetup {
             let r = 1.0 / if d.abs() < least { least.copysign(d) } else { d };
             r.clamp(-f32::MAX / 2.0, f32::MAX / 2.0)
         };
-        let r = d.map(reciprocal);
+        let r = [ray.direction.x, ray.direction.y, ray.direction.z].map(reciprocal);
         let margin = if ROBUST { MARGIN } else { 0.0 };
         Some(Self {
             origin: o,
@@ -75,6 +79,7 @@ impl RaySetup {
             t_max,
             axes: [x, y, z],
             shear: [d[x] * along, d[y] * along, along],
+            pivot: [pivot[x], pivot[y], pivot[z]],
         })
     }
 }
@@ -113,24 +118,32 @@ impl<F: Floats> SlabRay<F> {
         planes: &[[[f32; 8]; 2]; 3],
         t_max: F,
     ) -> (u32, F) {
-        let near = |axis: usize| {
-            let plane = simd.load8(&planes[axis][self.sign[axis] & 1]);
-            if ROBUST {
-                plane.sub(self.origin[axis]).mul(self.near[axis])
-            } else {
-                plane.mul_add(self.near[axis], self.origin[axis])
-            }
-        };
-        let far = |axis: usize| {
-            let plane = simd.load8(&planes[axis][self.sign[axis] & 1 ^ 1]);
-            if ROBUST {
-                plane.sub(self.origin[axis]).mul(self.far[axis])
-            } else {
-                plane.mul_add(self.near[axis], self.origin[axis])
-            }
-        };
-        let enter = near(0).max(near(1)).max(near(2).max(self.t_min));
-        let exit = far(0).min(far(1)).min(far(2).min(t_max));
+        let near = self.times::<S, ROBUST>(simd, planes, &self.near, 0);
+        let far = self.times::<S, ROBUST>(simd, planes, &self.far, 1);
+        let enter = near[0].max(near[1]).max(near[2].max(self.t_min));
+        let exit = far[0].min(far[1]).min(far[2].min(t_max));
         (enter.le(exit), enter)
+    }
+
+    /// Where the ray passes the planes that are entered (`side` 0) or left (1) by, by axis.
+    #[inline(always)]
+    fn times<S: Simd<F8 = F>, const ROBUST: bool>(
+        &self,
+        simd: S,
+        planes: &[[[f32; 8]; 2]; 3],
+        reciprocals: &[F; 3],
+        side: usize,
+    ) -> [F; 3] {
+        let mut times = *reciprocals;
+        for axis in 0..3 {
+            let plane = simd.load8(&planes[axis][self.sign[axis] & 1 ^ side]);
+            let (origin, reciprocal) = (self.origin[axis], reciprocals[axis]);
+            times[axis] = if ROBUST {
+                plane.sub(origin).mul(reciprocal)
+            } else {
+                plane.mul_add(reciprocal, origin)
+            };
+        }
+        times
     }
 }

@@ -39,8 +39,6 @@ pub(super) trait Simd: Copy {
     fn load8(self, x: &[f32; 8]) -> Self::F8;
     fn splat16(self, x: f32) -> Self::F16;
     fn load16(self, x: &[f32; 16]) -> Self::F16;
-    /// Asks for the cache lines of `x` ahead of their use.
-    fn prefetch<T>(self, x: &T);
     /// Runs a kernel compiled for this instruction set.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;
 }
@@ -197,9 +195,6 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn prefetch<T>(self, _x: &T) {}
-
-    #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         kernel.run(self)
     }
@@ -302,7 +297,8 @@ mod x86 {
 
     impl Avx512 {
         pub(in super::super) fn detect() -> Option<Self> {
-            let has_all = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl");
+            let has_all =
+                is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl");
             Avx2::detect().filter(|_| has_all).map(Self)
         }
     }
@@ -393,15 +389,6 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn prefetch<T>(self, x: &T) {
-            let start = std::ptr::from_ref(x).cast::<i8>();
-            for line in (0..size_of::<T>()).step_by(64) {
-                // SAFETY: a hint, which reads nothing; the address is within `x`.
-                unsafe { _mm_prefetch::<_MM_HINT_T0>(start.add(line)) };
-            }
-        }
-
-        #[inline(always)]
         fn run<K: Kernel>(self, kernel: K) -> K::Output {
             #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
             fn compiled<K: Kernel>(simd: Avx2, kernel: K) -> K::Output {
@@ -437,11 +424,6 @@ mod x86 {
             // SAFETY: `self` proves the instruction set; the array is as long as the register, and the
             // load needs no alignment.
             Avx16(unsafe { _mm512_loadu_ps(x.as_ptr()) })
-        }
-
-        #[inline(always)]
-        fn prefetch<T>(self, x: &T) {
-            self.0.prefetch(x);
         }
 
         #[inline(always)]

@@ -45,8 +45,7 @@ impl Found {
     /// of the tree nor that of rays is seen in a hit.
     #[inline(always)]
     pub(super) fn is_before(&self, other: &Self) -> bool {
-        self.t < other.t
-            || (self.t == other.t && (self.copy, self.id) < (other.copy, other.id))
+        self.t < other.t || (self.t == other.t && (self.copy, self.id) < (other.copy, other.id))
     }
 }
 
@@ -88,25 +87,17 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
 ) -> Option<Found> {
     let setup = RaySetup::new::<ROBUST>(ray)?;
     let mut best = Found::nothing(setup.t_max);
-    let ask = |item: u32, best: &mut Found| {
-        let ray = Ray { t_max: best.t, ..*ray };
-        if let Some(found) = items.intersect(simd, item, &ray)
-            && found.is_before(best)
-        {
-            *best = found;
-        }
-    };
     for &item in &tree.endless {
-        ask(item, &mut best);
+        ask(simd, items, item, ray, &mut best);
+    }
+    if tree.nodes.is_empty() {
+        return best.if_any();
     }
     let slabs = SlabRay::new::<S, ROBUST>(simd, &setup);
     let shear = ShearRay::new(simd, &setup);
     let mut stack = Stack::<STACK>::new();
     let mut current = Child::node(0);
     let mut t_far = simd.splat8(best.t);
-    if tree.nodes.is_empty() {
-        return best.if_any();
-    }
     'visit: loop {
         match current.content() {
             Content::Node(index) => {
@@ -130,7 +121,7 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
                 t_far = simd.splat8(best.t);
             }
             Content::Item(item) => {
-                ask(item, &mut best);
+                ask(simd, items, item, ray, &mut best);
                 t_far = simd.splat8(best.t);
             }
         }
@@ -145,10 +136,21 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
     best.if_any()
 }
 
+/// Asks an item for a hit that comes before `best`.
+#[inline(always)]
+pub(super) fn ask<S: Simd>(simd: S, items: impl Items, item: u32, ray: &Ray, best: &mut Found) {
+    let ray = Ray { t_max: best.t, ..*ray };
+    if let Some(found) = items.intersect(simd, item, &ray)
+        && found.is_before(best)
+    {
+        *best = found;
+    }
+}
+
 /// Puts all children that are hit on the stack, the nearest last, but for that one, which it returns.
 #[inline(always)]
-fn nearest<F: Floats<Array = [f32; 8]>, const N: usize>(
-    stack: &mut Stack<N>,
+fn nearest<F: Floats<Array = [f32; 8]>>(
+    stack: &mut Stack<STACK>,
     node: &Node,
     bits: u32,
     enter: F,

@@ -44,14 +44,28 @@ struct Candidates<F> {
 impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
     #[inline(always)]
     pub(super) fn new<S: Simd<F8 = F>>(simd: S, ray: &RaySetup) -> Self {
-        let origin = |i: usize| simd.splat8(ray.origin[ray.axes[i]]);
+        let [x, y, z] = ray.pivot;
         Self {
-            origin: [origin(0), origin(1), origin(2)],
+            origin: [simd.splat8(x), simd.splat8(y), simd.splat8(z)],
             shear: [simd.splat8(ray.shear[0]), simd.splat8(ray.shear[1])],
             axes: ray.axes,
             along: ray.shear[2],
             t_min: ray.t_min,
         }
+    }
+
+    /// Corners as the ray sees them.
+    #[inline(always)]
+    fn sheared<S: Simd<F8 = F>>(
+        &self,
+        simd: S,
+        [xs, ys, zs]: [&[[f32; 8]; 3]; 3],
+        i: usize,
+    ) -> [F; 3] {
+        let x = simd.load8(&xs[i]).sub(self.origin[0]);
+        let y = simd.load8(&ys[i]).sub(self.origin[1]);
+        let z = simd.load8(&zs[i]).sub(self.origin[2]);
+        [self.shear[0].neg_mul_add(z, x), self.shear[1].neg_mul_add(z, y), z]
     }
 
     #[inline(always)]
@@ -62,21 +76,13 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
     ) -> Candidates<F> {
         let [kx, ky, kz] = self.axes;
         let (xs, ys, zs) = (&block.corners[kx], &block.corners[ky], &block.corners[kz]);
-        let corner = |i: usize| {
-            let z = simd.load8(&zs[i]).sub(self.origin[2]);
-            let x = simd.load8(&xs[i]).sub(self.origin[0]);
-            let y = simd.load8(&ys[i]).sub(self.origin[1]);
-            (self.shear[0].neg_mul_add(z, x), self.shear[1].neg_mul_add(z, y), z)
-        };
-        let (ax, ay, az) = corner(0);
-        let (bx, by, bz) = corner(1);
-        let (cx, cy, cz) = corner(2);
-        let cross = |ax: F, ay: F, bx: F, by: F| {
-            if ROBUST { ax.mul(by).sub(ay.mul(bx)) } else { ax.mul_sub(by, ay.mul(bx)) }
-        };
-        let u = cross(cx, cy, bx, by);
-        let v = cross(ax, ay, cx, cy);
-        let w = cross(bx, by, ax, ay);
+        let corners = [xs, ys, zs];
+        let [ax, ay, az] = self.sheared(simd, corners, 0);
+        let [bx, by, bz] = self.sheared(simd, corners, 1);
+        let [cx, cy, cz] = self.sheared(simd, corners, 2);
+        let u = cross::<F, ROBUST>(cx, cy, bx, by);
+        let v = cross::<F, ROBUST>(ax, ay, cx, cy);
+        let w = cross::<F, ROBUST>(bx, by, ax, ay);
         let zero = simd.splat8(0.0);
         let bits = zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero);
         Candidates {
@@ -122,6 +128,12 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
             }
         }
     }
+}
+
+/// Twice the area that two corners span with the ray.
+#[inline(always)]
+fn cross<F: Floats, const ROBUST: bool>(ax: F, ay: F, bx: F, by: F) -> F {
+    if ROBUST { ax.mul(by).sub(ay.mul(bx)) } else { ax.mul_sub(by, ay.mul(bx)) }
 }
 
 /// Where all edge functions are zero in f32, they are asked in f64, in which products of f32 are exact.

@@ -59,7 +59,9 @@ impl<'a> Watch<'a> {
     /// [`AccelError::MemoryLimit`] where so many bytes more are too many.
     pub(super) fn reserve(&self, bytes: u64) -> Result<(), AccelError> {
         match self.limit {
-            Some(limit) if self.held.load(Ordering::Relaxed) + bytes > limit => Err(AccelError::MemoryLimit { limit }),
+            Some(limit) if self.held.load(Ordering::Relaxed) + bytes > limit => {
+                Err(AccelError::MemoryLimit { limit })
+            }
             _ => Ok(()),
         }
     }
