@@ -20,7 +20,7 @@ use rayon::prelude::*;
 fn main() {
     let scene = terrain(708);
     let camera: Vec<RayBlock> = camera_blocks(&scene, 0).into_iter().map(|(b, _)| b).collect();
-    let world = &scene.world;
+    let world = scene.world();
     for precision in Precision::ALL {
         let options = |kind| BuildOptions { kind, precision, ..BuildOptions::default() };
         let embree = EmbreeAccel::build(world, &options(AccelKind::default()), &|_| true);

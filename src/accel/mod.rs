@@ -92,7 +92,7 @@ impl Hit {
 pub enum Precision {
     /// Embree's defaults: some rays are lost at edges and far from the origin.
     Fast,
-    /// Watertight at edges (not quite at vertices), accurate far from the origin.
+    /// Watertight at edges (Embree's not quite at vertices), accurate far from the origin.
     #[default]
     Robust,
 }
@@ -116,12 +116,12 @@ pub enum BuildQuality {
     /// As suits the scene; medium at present.
     #[default]
     Auto,
-    /// Fast to build. With several threads it may come out different from run to run, and so may which
-    /// of two coincident surfaces is hit.
+    /// Fast to build. Embree's may come out different from run to run with several threads, and so may
+    /// which of two coincident surfaces is hit.
     Low,
     /// Between the two.
     Medium,
-    /// Fast to trace; differs from medium only with `precision = "fast"`.
+    /// Fast to trace; differs from medium only in Embree's, with `precision = "fast"`.
     High,
 }
 

@@ -88,7 +88,8 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "NAME", value_parser = by_name(&Filter::ALL, Filter::name))]
     pub(super) filter: Option<Filter>,
 
-    /// What answers ray queries; `brute` is an f64 loop over everything, for small scenes and comparison
+    /// What answers ray queries; `bvh` is our own hierarchy, and `brute` an f64 loop over everything, for
+    /// small scenes and comparison
     #[arg(long, value_name = "NAME", default_value = AccelKind::ALL[0].name(),
           value_parser = by_name(AccelKind::ALL, AccelKind::name))]
     pub(super) accel: AccelKind,
