@@ -277,6 +277,7 @@ impl Builder<'_> {
     }
 
     /// The best split between bins, if the centres differ at all.
+    #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
     fn best_split(&self, part: &Part) -> Option<Split> {
         let n = part.refs.len();
         // As Embree has it: fewer bins for fewer primitives.

@@ -93,6 +93,7 @@ impl Packet {
     /// Calls `visit` for each leaf that rays meet, the nearest first, with their lanes, until it returns
     /// false.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
     fn traverse<S: Simd>(
         &mut self,
         simd: S,
