@@ -28,7 +28,7 @@ fn main() {
     assert_eq!(scene.requirements.variant, Variant::Local);
     match &scene.accel {
         Accel::Embree(query) => against_minimal(&scene, query),
-        Accel::Brute(_) => unreachable!("Embree is the default"),
+        _ => unreachable!("Embree is the default"),
     }
     for more in [Variant::Tree, Variant::Everything] {
         forced(&scene, more);

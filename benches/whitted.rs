@@ -34,7 +34,7 @@ fn main() {
     );
     match &scene.accel {
         Accel::Embree(query) => measure(&scene, query),
-        Accel::Brute(_) => unreachable!("Embree is the default"),
+        _ => unreachable!("Embree is the default"),
     }
     against_pov(&scene);
     against_mitsuba(&scene);

@@ -1,12 +1,12 @@
-//! Ray queries against the f64 oracle: every ray of Embree's must hit what brute force hits, on random
-//! worlds of triangles, shapes and transformed copies, near and far, at both rungs of precision.
-#![cfg(feature = "embree")]
+//! Ray queries against the f64 oracle: every ray must hit what brute force hits, on random worlds of
+//! triangles, shapes and transformed copies, near and far, at both rungs of precision, with Embree and
+//! with our own hierarchy.
 #![allow(missing_docs, clippy::print_stderr, reason = "a test program")]
 
 use std::sync::Arc;
 
 use alhazen::accel::{
-    AccelKind, BruteForce, BuildOptions, EmbreeAccel, Geometry, Group, Hit, InstanceSet, LANES,
+    Accel, AccelKind, BruteForce, BuildOptions, Geometry, Group, Hit, InstanceSet, LANES,
     Precision, RayBlock, RayQuery, World, affine_from_rows, rows_from_affine,
 };
 use alhazen::geometry::{Cone, Cuboid, Framed, Sphere, Torus, TriangleMesh};
@@ -19,9 +19,20 @@ use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 mod common;
 use common::Random;
 
-fn embree(world: &World, precision: Precision) -> EmbreeAccel {
-    let options = BuildOptions { precision, ..BuildOptions::default() };
-    EmbreeAccel::build(world, &options, &|_| true).unwrap()
+/// Every kind but the oracle, with its name.
+fn hierarchies(world: &World, precision: Precision) -> Vec<(&'static str, Box<dyn RayQuery>)> {
+    let kinds = AccelKind::ALL.iter().filter(|kind| **kind != AccelKind::Brute);
+    kinds.map(|kind| (kind.name(), boxed(world, *kind, precision))).collect()
+}
+
+fn boxed(world: &World, kind: AccelKind, precision: Precision) -> Box<dyn RayQuery> {
+    let options = BuildOptions { kind, precision, ..BuildOptions::default() };
+    match Accel::build(world, &options, &|_| true).unwrap() {
+        #[cfg(feature = "embree")]
+        Accel::Embree(accel) => Box::new(accel),
+        Accel::Bvh(accel) => Box::new(accel),
+        Accel::Brute(accel) => Box::new(accel),
+    }
 }
 
 /// A closed ball of triangles with a bumpy surface.
@@ -172,7 +183,7 @@ fn who(hit: &Hit) -> (Option<alhazen::accel::CopyRef>, u32, u32) {
     (hit.copy, hit.geometry, hit.primitive)
 }
 
-fn check(oracle: &BruteForce, accel: &EmbreeAccel, rays: &[Ray], seed: u64) -> usize {
+fn check(oracle: &BruteForce, accel: &dyn RayQuery, rays: &[Ray], seed: u64) -> usize {
     let mut borderline = 0;
     for ray in rays {
         let expected = oracle.intersect(ray);
@@ -209,7 +220,7 @@ fn check(oracle: &BruteForce, accel: &EmbreeAccel, rays: &[Ray], seed: u64) -> u
 }
 
 #[test]
-fn embree_agrees_with_the_oracle() {
+fn hierarchies_agree_with_the_oracle() {
     let worlds = if common::verify() { 400 } else { 40 };
     for seed in 0..worlds {
         let mut random = Random(seed);
@@ -217,8 +228,10 @@ fn embree_agrees_with_the_oracle() {
         let oracle = BruteForce::new(&world);
         let rays: Vec<Ray> = (0..500).map(|_| random_ray(&mut random)).collect();
         for precision in Precision::ALL {
-            let borderline = check(&oracle, &embree(&world, precision), &rays, seed);
-            assert!(borderline <= 5, "seed {seed}: {borderline} of 500 rays were borderline");
+            for (name, accel) in hierarchies(&world, precision) {
+                let borderline = check(&oracle, &*accel, &rays, seed);
+                assert!(borderline <= 5, "{name}, seed {seed}: {borderline} of 500 borderline");
+            }
         }
     }
 }
@@ -226,11 +239,19 @@ fn embree_agrees_with_the_oracle() {
 /// A block traced in packets gives what its rays give one by one; where two primitives touch, either.
 #[test]
 fn blocks_agree_with_single_rays() {
+    for kind in AccelKind::ALL {
+        let allowed = if kind.name() == "embree" { 2 } else { 0 };
+        let different = blocks_that_differ(*kind);
+        assert!(different <= allowed, "{different} lanes of {} named another", kind.name());
+    }
+}
+
+fn blocks_that_differ(kind: AccelKind) -> usize {
     let mut different = 0;
     for seed in 100..120 {
         let mut random = Random(seed);
         let world = random_world(&mut random);
-        let accel = embree(&world, Precision::Robust);
+        let accel = boxed(&world, kind, Precision::Robust);
         for _ in 0..100 {
             let ray = random_ray(&mut random);
             let mut block = RayBlock::empty();
@@ -262,7 +283,7 @@ fn blocks_agree_with_single_rays() {
             }
         }
     }
-    assert!(different <= 2, "{different} lanes named another primitive");
+    different
 }
 
 /// Copies that stand side by side are told apart.
@@ -281,15 +302,16 @@ fn many_copies_are_told_apart() {
     let rows: Vec<_> = (0..n).map(place).collect();
     let set = InstanceSet { prototype: 0, transforms: Arc::new(rows) };
     let world = World { prototypes: vec![prototype], sets: vec![set], ..World::default() };
-    let accel = embree(&world, Precision::Robust);
-    for _ in 0..2000 {
-        let i = random.below(n as usize) as u32;
-        let (x, z) = (f64::from(i % 300), f64::from(i / 300));
-        let offset = random.in_cube() * 0.2;
-        let origin = DVec3::new(x + offset.x, 5.0, z + offset.z).as_vec3();
-        let hit = accel.intersect(&Ray::new(origin, Vec3::NEG_Y)).unwrap();
-        assert_eq!(hit.copy.unwrap().index, i);
-        assert!(hit.t > 4.5 && hit.t < 5.0);
+    for (name, accel) in hierarchies(&world, Precision::Robust) {
+        for _ in 0..2000 {
+            let i = random.below(n as usize) as u32;
+            let (x, z) = (f64::from(i % 300), f64::from(i / 300));
+            let offset = random.in_cube() * 0.2;
+            let origin = DVec3::new(x + offset.x, 5.0, z + offset.z).as_vec3();
+            let hit = accel.intersect(&Ray::new(origin, Vec3::NEG_Y)).unwrap();
+            assert_eq!(hit.copy.unwrap().index, i, "{name}");
+            assert!(hit.t > 4.5 && hit.t < 5.0, "{name}");
+        }
     }
 }
 
@@ -305,30 +327,45 @@ fn robust_loses_no_ray_at_edges() {
         .collect();
     let group = Group { geometries: vec![Geometry::Mesh(mesh)], ..Group::default() };
     let world = World { root: group, ..World::default() };
-    let lost = |precision: Precision| {
-        let accel = embree(&world, precision);
+    let lost = |kind: AccelKind, precision: Precision, ends: [f64; 2]| {
+        let accel = boxed(&world, kind, precision);
         let mut random = Random(1);
         let n = if common::verify() { 1_000_000 } else { 100_000 };
         (0..n)
             .filter(|_| {
                 let [a, b] = edges[random.below(edges.len())];
-                let target = a.lerp(b, random.between(0.05, 0.95) as f32);
+                let target = a.lerp(b, random.between(ends[0], ends[1]) as f32);
                 let origin = (random.in_cube() * 0.1).as_vec3();
                 let ray = Ray::new(origin, (target - origin).normalize());
                 accel.intersect(&ray).is_none()
             })
             .count()
     };
-    let (robust, fast) = (lost(Precision::Robust), lost(Precision::Fast));
-    eprintln!("lost at edges: robust {robust}, fast {fast}");
-    assert_eq!(robust, 0);
-    assert!(fast > 0, "then `fast` costs nothing in accuracy, and `robust` can go");
+    const WITHIN: [f64; 2] = [0.05, 0.95];
+    const AT_VERTEX: [f64; 2] = [0.0, 0.0];
+    assert_eq!(lost(AccelKind::Bvh, Precision::Robust, WITHIN), 0);
+    assert_eq!(lost(AccelKind::Bvh, Precision::Robust, AT_VERTEX), 0);
+    eprintln!("lost by bvh fast: {}", lost(AccelKind::Bvh, Precision::Fast, WITHIN));
+    #[cfg(feature = "embree")]
+    {
+        let [robust, fast] =
+            [Precision::Robust, Precision::Fast].map(|p| lost(AccelKind::Embree, p, WITHIN));
+        eprintln!("lost at edges: robust {robust}, fast {fast}");
+        assert_eq!(robust, 0);
+        assert!(fast > 0, "then `fast` costs nothing in accuracy, and `robust` can go");
+    }
 }
 
 /// A ray that leaves a convex surface outward hits nothing: every hit is a false one with itself. From the
 /// inside of a ring, it does not hit before it has crossed the ring.
 #[test]
 fn no_ray_hits_the_surface_that_it_leaves() {
+    for kind in AccelKind::ALL.iter().filter(|kind| **kind != AccelKind::Brute) {
+        no_ray_of_one_hits_the_surface_that_it_leaves(*kind);
+    }
+}
+
+fn no_ray_of_one_hits_the_surface_that_it_leaves(accelerator: AccelKind) {
     let sphere = |center: DVec3, radius: f64| ShapeDesc::Sphere { center, radius };
     let n = if common::verify() { 200_000 } else { 20_000 };
     for (offset, scale, squeeze) in [
@@ -403,8 +440,13 @@ fn no_ray_hits_the_surface_that_it_leaves() {
             }
             desc.objects.extend([object, ObjectDesc::new(anchor.clone(), None)]);
             assert_eq!(desc.settings.epsilon, Epsilon::Auto);
-            let scene = Scene::build_quietly(desc, AccelKind::Embree).unwrap();
-            let alhazen::accel::Accel::Embree(accel) = &scene.accel else { unreachable!() };
+            let scene = Scene::build_quietly(desc, accelerator).unwrap();
+            let accel: &dyn RayQuery = match &scene.accel {
+                #[cfg(feature = "embree")]
+                Accel::Embree(accel) => accel,
+                Accel::Bvh(accel) => accel,
+                Accel::Brute(accel) => accel,
+            };
             let center = center - scene.center;
 
             let mut random = Random(9);
@@ -449,7 +491,7 @@ fn no_ray_hits_the_surface_that_it_leaves() {
 }
 
 /// Whether the next thing that `ray` meets is the primitive that it left.
-fn is_own(accel: &EmbreeAccel, ray: &Ray, left: &Hit) -> bool {
+fn is_own(accel: &dyn RayQuery, ray: &Ray, left: &Hit) -> bool {
     accel.intersect(ray).is_some_and(|hit| who(&hit) == who(left))
 }
 

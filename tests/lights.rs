@@ -87,6 +87,7 @@ fn a_light_does_not_block_itself() {
             let is_blocked = match &accel {
                 #[cfg(feature = "embree")]
                 Accel::Embree(accel) => accel.occluded(&ray),
+                Accel::Bvh(accel) => accel.occluded(&ray),
                 Accel::Brute(accel) => accel.occluded(&ray),
             };
             rays += 1;

@@ -117,6 +117,7 @@ fn ours(case: &Case<'_>) -> Vec<Option<Seen>> {
     let intersect = |ray: &Ray| match &scene.accel {
         #[cfg(feature = "embree")]
         Accel::Embree(accel) => accel.intersect(ray),
+        Accel::Bvh(accel) => accel.intersect(ray),
         Accel::Brute(accel) => accel.intersect(ray),
     };
     let seen = |x: u32, y: u32| {

@@ -1,11 +1,13 @@
-//! The one seam for ray queries: what there is to hit goes in, hits come out. Embree on one side, a
-//! brute-force loop in f64 on the other, with the same answers; and plain trees to compare them with.
+//! The one seam for ray queries: what there is to hit goes in, hits come out. Behind it are Embree, a
+//! hierarchy of our own and a brute-force loop in f64, with the same answers; and plain trees to compare
+//! them with.
 //!
 //! It owns how rays are found to hit something, and decides which query suits which ray. It does not
 //! know what a hit looks like: materials, lights and normals are the scene's.
 
 mod block;
 mod brute;
+mod bvh;
 #[cfg(feature = "crates")]
 mod crates;
 #[cfg(feature = "embree")]
@@ -23,6 +25,7 @@ use std::fmt;
 pub(crate) use block::lanes_of;
 pub use block::{HitBlock, LANES, RayBlock};
 pub use brute::BruteForce;
+pub use bvh::BvhAccel;
 #[cfg(feature = "crates")]
 pub use crates::{BvhCrate, CannotFlatten, Flat, ObvhsBvh2, ObvhsCwBvh};
 #[cfg(feature = "embree")]
@@ -103,7 +106,7 @@ impl Hit {
 pub enum Precision {
     /// Embree's defaults: some rays are lost at edges and far from the origin.
     Fast,
-    /// Watertight at edges (not quite at vertices), accurate far from the origin.
+    /// Watertight at edges (Embree's not quite at vertices), accurate far from the origin.
     #[default]
     Robust,
 }
@@ -127,12 +130,12 @@ pub enum BuildQuality {
     /// As suits the scene; medium at present.
     #[default]
     Auto,
-    /// Fast to build. With several threads it may come out different from run to run, and so may which
-    /// of two coincident surfaces is hit.
+    /// Fast to build. Embree's may come out different from run to run with several threads, and so may
+    /// which of two coincident surfaces is hit.
     Low,
     /// Between the two.
     Medium,
-    /// Fast to trace; differs from medium only with `precision = "fast"`.
+    /// Fast to trace; differs from medium only in Embree's, with `precision = "fast"`.
     High,
 }
 
@@ -157,6 +160,8 @@ pub enum AccelKind {
     /// Embree 4.
     #[cfg(feature = "embree")]
     Embree,
+    /// Our own hierarchy, eight wide.
+    Bvh,
     /// Every ray against every primitive, in f64: the oracle, for small scenes.
     Brute,
 }
@@ -166,6 +171,7 @@ impl AccelKind {
     pub const ALL: &[Self] = &[
         #[cfg(feature = "embree")]
         Self::Embree,
+        Self::Bvh,
         Self::Brute,
     ];
 
@@ -174,6 +180,7 @@ impl AccelKind {
         match self {
             #[cfg(feature = "embree")]
             Self::Embree => "embree",
+            Self::Bvh => "bvh",
             Self::Brute => "brute",
         }
     }
@@ -230,6 +237,11 @@ pub enum AccelError {
         /// The limit.
         limit: u64,
     },
+    /// More than can be numbered.
+    #[error(
+        "a group of more than 2³² − 2 triangles, or of 2³⁰ shapes and copies, cannot be built over"
+    )]
+    TooMany,
 }
 
 /// An acceleration structure that was built. Match on it once, outside the loop over rays.
@@ -238,6 +250,8 @@ pub enum Accel {
     /// Embree 4.
     #[cfg(feature = "embree")]
     Embree(EmbreeAccel),
+    /// Our own hierarchy.
+    Bvh(BvhAccel),
     /// Every ray against every primitive.
     Brute(BruteForce),
 }
@@ -248,6 +262,7 @@ macro_rules! with_accel {
         match $accel {
             #[cfg(feature = "embree")]
             $crate::accel::Accel::Embree($query) => $body,
+            $crate::accel::Accel::Bvh($query) => $body,
             $crate::accel::Accel::Brute($query) => $body,
         }
     };
@@ -268,6 +283,7 @@ impl Accel {
         match options.kind {
             #[cfg(feature = "embree")]
             AccelKind::Embree => EmbreeAccel::build(world, options, progress).map(Self::Embree),
+            AccelKind::Bvh => BvhAccel::build(world, options, progress).map(Self::Bvh),
             AccelKind::Brute if !progress(0.0) => Err(AccelError::Interrupted),
             AccelKind::Brute => Ok(Self::Brute(BruteForce::new(world))),
         }

@@ -108,7 +108,8 @@ pub(super) struct SceneArgs {
 /// What answers ray queries.
 #[derive(Debug, clap::Args)]
 pub(super) struct AccelArgs {
-    /// What answers ray queries; `brute` is an f64 loop over everything, for small scenes and comparison
+    /// What answers ray queries; `bvh` is our own hierarchy, and `brute` an f64 loop over everything, for
+    /// small scenes and comparison
     #[arg(id = "accel", long, value_name = "NAME", default_value = AccelKind::ALL[0].name(),
           value_parser = by_name(AccelKind::ALL, AccelKind::name))]
     pub(super) kind: AccelKind,

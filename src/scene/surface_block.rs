@@ -1,6 +1,8 @@
 //! The surface points of a block side by side: what [`Scene::surface`] finds for each lane, in loops over
 //! lanes that the compiler turns into vector instructions.
 
+#![expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
+
 use glam::Vec3;
 
 use super::build::Scene;

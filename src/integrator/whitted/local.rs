@@ -1,6 +1,8 @@
 //! Direct light alone, a block at a time: the variant without a tree. The loops over lanes are without
 //! branches, for the compiler to turn into vector instructions.
 
+#![expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
+
 use super::super::{CameraBlock, RayCounts};
 use crate::accel::{HitBlock, LANES, RayQuery, lanes_of};
 use crate::color::Rgb;

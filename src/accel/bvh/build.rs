@@ -1,0 +1,511 @@
+//! Builds a tree: the surface area heuristic over bins, top down, in parallel, and the same tree
+//! whatever the number of threads.
+//!
+//! A node takes the box of largest area among its children and splits it in two, until it has eight of
+//! them. Sources: Wald, *On fast construction of SAH-based bounding volume hierarchies*, RT 2007 (bins);
+//! Wald, Benthin, Boulos, *Getting rid of packets*, RT 2008 (wide nodes).
+
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::super::AccelError;
+use super::node::{Child, Node, Tree, TriangleBlock, WIDTH};
+use super::watch::Watch;
+
+/// Below so many levels of nodes, boxes are split in halves of equal number: coordinates that grow
+/// geometrically would make a tree as deep as they are many.
+const SAH_DEPTH: usize = 24;
+
+/// No tree is deeper than this: each level of halves has an eighth of the primitives of the one above it,
+/// rounded up, or one level more where a node was filled unevenly; there are fewer than 2³² of them.
+pub(super) const MAX_DEPTH: usize = SAH_DEPTH + 24;
+
+/// Bins an axis, at most.
+const BINS: usize = 32;
+
+/// Primitives from which on a box is split by several threads, and those of a piece of that work.
+const PARALLEL: usize = 1 << 15;
+const CHUNK: usize = 1 << 13;
+
+/// Primitives from which on children are built by several threads.
+const TASK: usize = 1 << 12;
+
+/// The box of a primitive. In the fourth places: its number, and whether it is an item.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reference {
+    lower: Vec4,
+    upper: Vec4,
+}
+
+impl Reference {
+    pub(super) fn triangle(id: u32, [a, b, c]: [Vec3; 3]) -> Self {
+        let (lower, upper) = (a.min(b).min(c), a.max(b).max(c));
+        Self { lower: lower.extend(f32::from_bits(id)), upper: upper.extend(0.0) }
+    }
+
+    pub(super) fn item(index: u32, lower: Vec3, upper: Vec3) -> Self {
+        Self { lower: lower.extend(f32::from_bits(index)), upper: upper.extend(1.0) }
+    }
+
+    /// Whether all its numbers are.
+    pub(super) fn is_finite(&self) -> bool {
+        self.lower.truncate().is_finite() && self.upper.truncate().is_finite()
+    }
+
+    #[inline]
+    pub(super) fn id(&self) -> u32 {
+        self.lower.w.to_bits()
+    }
+
+    #[inline]
+    fn is_item(&self) -> bool {
+        self.upper.w == 1.0
+    }
+
+    /// Twice its centre.
+    #[inline(always)]
+    fn center(&self) -> Vec4 {
+        self.lower + self.upper
+    }
+}
+
+/// A box; the fourth places mean nothing.
+#[derive(Debug, Clone, Copy)]
+struct Box4 {
+    lower: Vec4,
+    upper: Vec4,
+}
+
+impl Box4 {
+    const EMPTY: Self = Self { lower: Vec4::INFINITY, upper: Vec4::NEG_INFINITY };
+
+    #[inline(always)]
+    fn union(self, other: Self) -> Self {
+        Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, lower: Vec4, upper: Vec4) {
+        self.lower = self.lower.min(lower);
+        self.upper = self.upper.max(upper);
+    }
+
+    /// Half its area.
+    #[inline(always)]
+    fn area(&self) -> f32 {
+        let d = self.upper - self.lower;
+        d.x * (d.y + d.z) + d.y * d.z
+    }
+}
+
+/// Primitives that will become one child.
+struct Part<'a> {
+    refs: &'a mut [Reference],
+    /// Place of the first among all.
+    start: usize,
+    bounds: Box4,
+    /// Of twice the centres.
+    centers: Box4,
+}
+
+/// A part of a tree, with indices of its own.
+#[derive(Default)]
+struct Subtree {
+    nodes: Vec<Node>,
+    leaves: Vec<Leaf>,
+}
+
+/// Where the triangles of a leaf are among all primitives.
+#[derive(Clone, Copy)]
+struct Leaf {
+    start: u32,
+    len: u32,
+}
+
+/// Builds the tree over `refs`. `bins` bounds the effort, and `corners` tells those of a triangle.
+pub(super) fn build(
+    mut refs: Vec<Reference>,
+    endless: Vec<u32>,
+    bins: usize,
+    corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+    watch: &Watch,
+) -> Result<Tree, AccelError> {
+    if refs.is_empty() {
+        return Ok(Tree { endless, ..Tree::default() });
+    }
+    let refs_bytes = size_of_val(&refs[..]) as u64;
+    let whole = Part::new(&mut refs, 0);
+    let builder = Builder { bins: bins.clamp(4, BINS), watch };
+    let Subtree { nodes, leaves } = builder.subtree(whole, 0);
+    watch.check()?;
+    let bytes = size_of_val(&nodes[..])
+        + size_of_val(&leaves[..])
+        + leaves.len() * size_of::<TriangleBlock>();
+    watch.reserve(refs_bytes + bytes as u64)?;
+    let block = |leaf: &Leaf| {
+        let refs = &refs[leaf.start as usize..][..leaf.len as usize];
+        let mut block = TriangleBlock { corners: [[[0.0; WIDTH]; 3]; 3], ids: [0; WIDTH] };
+        for lane in 0..WIDTH {
+            let id = refs[lane.min(refs.len() - 1)].id();
+            block.ids[lane] = id;
+            for (corner, p) in corners(id).into_iter().enumerate() {
+                for axis in 0..3 {
+                    block.corners[axis][corner][lane] = p[axis];
+                }
+            }
+        }
+        block
+    };
+    let blocks: Vec<TriangleBlock> = leaves.par_iter().with_min_len(512).map(block).collect();
+    Ok(Tree { nodes, blocks, endless })
+}
+
+impl<'a> Part<'a> {
+    fn new(refs: &'a mut [Reference], start: usize) -> Self {
+        let add = |(mut bounds, mut centers): (Box4, Box4), r: &Reference| {
+            bounds.add(r.lower, r.upper);
+            centers.add(r.center(), r.center());
+            (bounds, centers)
+        };
+        let empty = (Box4::EMPTY, Box4::EMPTY);
+        let (bounds, centers) = refs
+            .par_chunks(CHUNK)
+            .map(|chunk| chunk.iter().fold(empty, add))
+            .reduce(|| empty, |a, b| (a.0.union(b.0), a.1.union(b.1)));
+        Self { refs, start, bounds, centers }
+    }
+
+    /// Whether one leaf can hold it.
+    fn is_leaf(&self) -> bool {
+        self.refs.len() == 1
+            || (self.refs.len() <= WIDTH && !self.refs.iter().any(Reference::is_item))
+    }
+}
+
+struct Builder<'a> {
+    bins: usize,
+    watch: &'a Watch<'a>,
+}
+
+impl Builder<'_> {
+    /// The tree over `part`, its root first.
+    fn subtree(&self, part: Part, depth: usize) -> Subtree {
+        let mut tree = Subtree::default();
+        self.append(&mut tree, part, depth);
+        tree
+    }
+
+    /// Appends the node over `part`, and all that is below it.
+    fn append(&self, tree: &mut Subtree, part: Part, depth: usize) {
+        let is_large = part.refs.len() >= TASK;
+        if is_large && self.watch.is_stopped() {
+            return;
+        }
+        let len = part.refs.len() as u64;
+        let parts = self.children(part, depth);
+        let mut node = Node::EMPTY;
+        let index = tree.nodes.len();
+        tree.nodes.push(node);
+        if is_large {
+            let build = |part: Part| {
+                let (bounds, len) = (part.bounds, part.refs.len());
+                let mut subtree = Subtree::default();
+                let child = self.child(&mut subtree, part, depth);
+                if len < TASK {
+                    self.watch.add(len as u64);
+                }
+                (bounds, child, subtree)
+            };
+            let subtrees: Vec<_> = parts.into_par_iter().map(build).collect();
+            for (lane, (bounds, child, subtree)) in subtrees.into_iter().enumerate() {
+                set(&mut node, lane, &bounds, tree.moved(child));
+                tree.merge(subtree);
+            }
+        } else {
+            for (lane, part) in parts.into_iter().enumerate() {
+                let bounds = part.bounds;
+                let child = self.child(tree, part, depth);
+                set(&mut node, lane, &bounds, child);
+            }
+            if depth == 0 {
+                self.watch.add(len);
+            }
+        }
+        tree.nodes[index] = node;
+    }
+
+    /// Appends what is in a child of a node at `depth`.
+    fn child(&self, tree: &mut Subtree, part: Part, depth: usize) -> Child {
+        if !part.is_leaf() {
+            let index = tree.nodes.len();
+            self.append(tree, part, depth + 1);
+            return Child::node(index);
+        }
+        match &*part.refs {
+            [item] if item.is_item() => Child::item(item.id()),
+            triangles => {
+                tree.leaves.push(Leaf { start: part.start as u32, len: triangles.len() as u32 });
+                Child::triangles(tree.leaves.len() - 1)
+            }
+        }
+    }
+
+    /// Cuts a part into those of the children of one node.
+    fn children<'p>(&self, part: Part<'p>, depth: usize) -> Vec<Part<'p>> {
+        let mut parts = Vec::with_capacity(WIDTH);
+        parts.push(part);
+        while parts.len() < WIDTH {
+            // Where halves are made, of the largest number.
+            let size = |part: &Part| match depth {
+                ..SAH_DEPTH => part.bounds.area(),
+                _ => part.refs.len() as f32,
+            };
+            let candidates = parts.iter().enumerate().filter(|(_, part)| !part.is_leaf());
+            let Some((largest, _)) =
+                candidates.map(|(i, part)| (i, size(part))).max_by(|a, b| a.1.total_cmp(&b.1))
+            else {
+                break;
+            };
+            let part = parts.swap_remove(largest);
+            let split = (depth < SAH_DEPTH).then(|| self.best_split(&part)).flatten();
+            parts.extend(match split {
+                Some(split) => split.apply(part),
+                None => halves(part),
+            });
+        }
+        parts
+    }
+
+    /// The best split between bins, if the centres differ at all.
+    #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
+    fn best_split(&self, part: &Part) -> Option<Split> {
+        let n = part.refs.len();
+        // As Embree has it: fewer bins for fewer primitives.
+        let bins = self.bins.min(4 + n / 16);
+        let extent = part.centers.upper - part.centers.lower;
+        let scale = |d: f32| if d > 0.0 { (bins - 1) as f32 / d } else { 0.0 };
+        let map = BinMap {
+            lower: part.centers.lower,
+            scale: Vec4::new(scale(extent.x), scale(extent.y), scale(extent.z), 0.0),
+        };
+        let add = |mut counted: Bins, refs: &[Reference]| {
+            refs.iter().for_each(|r| counted.add(&map, r));
+            counted
+        };
+        let counted = if n < PARALLEL {
+            add(Bins::EMPTY, part.refs)
+        } else {
+            let chunks = part.refs.par_chunks(CHUNK);
+            chunks.fold(|| Bins::EMPTY, add).reduce(|| Bins::EMPTY, Bins::union)
+        };
+        let mut best: Option<(f32, usize, usize)> = None;
+        for axis in 0..3 {
+            // Areas and numbers to the right of each boundary, then those to the left.
+            let mut right = [0.0; BINS];
+            let (mut bounds, mut count) = (Box4::EMPTY, 0);
+            for i in (1..bins).rev() {
+                bounds = bounds.union(counted.bounds[axis][i]);
+                count += counted.counts[axis][i];
+                right[i] = if count == 0 { f32::INFINITY } else { bounds.area() * blocks(count) };
+            }
+            let (mut bounds, mut count) = (Box4::EMPTY, 0);
+            for i in 1..bins {
+                bounds = bounds.union(counted.bounds[axis][i - 1]);
+                count += counted.counts[axis][i - 1];
+                if count == 0 {
+                    continue;
+                }
+                let cost = bounds.area() * blocks(count) + right[i];
+                if cost < best.map_or(f32::INFINITY, |b| b.0) {
+                    best = Some((cost, axis, i));
+                }
+            }
+        }
+        best.map(|(_, axis, bin)| Split { map, axis, bin: bin as u32 })
+    }
+}
+
+/// The cost of a number of primitives: it goes by blocks.
+#[inline(always)]
+fn blocks(count: u32) -> f32 {
+    count.div_ceil(BLOCK) as f32
+}
+const BLOCK: u32 = 4;
+
+fn set(node: &mut Node, lane: usize, bounds: &Box4, child: Child) {
+    let corner = |p: Vec4| p.truncate().to_array();
+    node.set(lane, corner(bounds.lower), corner(bounds.upper), child);
+}
+
+impl Subtree {
+    /// A child of a subtree that is about to be merged.
+    fn moved(&self, child: Child) -> Child {
+        use super::node::Content;
+        match child.content() {
+            Content::Node(i) => Child::node(i + self.nodes.len()),
+            Content::Triangles(i) => Child::triangles(i + self.leaves.len()),
+            Content::Item(_) => child,
+        }
+    }
+
+    fn merge(&mut self, mut other: Self) {
+        for node in &mut other.nodes {
+            for lane in 0..WIDTH {
+                if node.is_set(lane) {
+                    node.children[lane] = self.moved(node.children[lane]);
+                }
+            }
+        }
+        self.nodes.append(&mut other.nodes);
+        self.leaves.append(&mut other.leaves);
+    }
+}
+
+/// From centres to bins.
+#[derive(Clone, Copy)]
+struct BinMap {
+    lower: Vec4,
+    scale: Vec4,
+}
+
+impl BinMap {
+    #[inline(always)]
+    fn bins(&self, r: &Reference) -> [u32; 3] {
+        // The last bits of 2²³ + x are x, rounded.
+        let x = (r.center() - self.lower) * self.scale + Vec4::splat(8_388_608.0);
+        [x.x, x.y, x.z].map(|x| x.to_bits() & (BINS as u32 - 1))
+    }
+}
+
+struct Bins {
+    bounds: [[Box4; BINS]; 3],
+    counts: [[u32; BINS]; 3],
+}
+
+impl Bins {
+    const EMPTY: Self = Self { bounds: [[Box4::EMPTY; BINS]; 3], counts: [[0; BINS]; 3] };
+
+    #[inline(always)]
+    fn add(&mut self, map: &BinMap, r: &Reference) {
+        for (axis, bin) in map.bins(r).into_iter().enumerate() {
+            self.bounds[axis][bin as usize].add(r.lower, r.upper);
+            self.counts[axis][bin as usize] += 1;
+        }
+    }
+
+    fn union(mut self, other: Self) -> Self {
+        for axis in 0..3 {
+            for i in 0..BINS {
+                self.bounds[axis][i] = self.bounds[axis][i].union(other.bounds[axis][i]);
+                self.counts[axis][i] += other.counts[axis][i];
+            }
+        }
+        self
+    }
+}
+
+/// Between two bins.
+struct Split {
+    map: BinMap,
+    axis: usize,
+    bin: u32,
+}
+
+/// What one side of a split holds.
+#[derive(Clone, Copy)]
+struct Side {
+    bounds: Box4,
+    centers: Box4,
+}
+
+impl Side {
+    const EMPTY: Self = Self { bounds: Box4::EMPTY, centers: Box4::EMPTY };
+
+    #[inline(always)]
+    fn add(&mut self, r: &Reference) {
+        self.bounds.add(r.lower, r.upper);
+        self.centers.add(r.center(), r.center());
+    }
+
+    fn union(self, other: Self) -> Self {
+        Self { bounds: self.bounds.union(other.bounds), centers: self.centers.union(other.centers) }
+    }
+}
+
+impl Split {
+    #[inline(always)]
+    fn is_left(&self, r: &Reference) -> bool {
+        self.map.bins(r)[self.axis] < self.bin
+    }
+
+    /// Moves what is left to the front.
+    fn partition(&self, refs: &mut [Reference]) -> (usize, [Side; 2]) {
+        let mut sides = [Side::EMPTY; 2];
+        let (mut i, mut j) = (0, refs.len());
+        loop {
+            while i < j && self.is_left(&refs[i]) {
+                sides[0].add(&refs[i]);
+                i += 1;
+            }
+            while i < j && !self.is_left(&refs[j - 1]) {
+                sides[1].add(&refs[j - 1]);
+                j -= 1;
+            }
+            if i >= j {
+                return (i, sides);
+            }
+            refs.swap(i, j - 1);
+        }
+    }
+
+    /// The same by several threads: every piece by itself, and then what is on the wrong side is swapped.
+    fn partition_in_parallel(&self, refs: &mut [Reference]) -> (usize, [Side; 2]) {
+        let pieces: Vec<(usize, [Side; 2])> =
+            refs.par_chunks_mut(CHUNK).map(|chunk| self.partition(chunk)).collect();
+        let middle = pieces.iter().map(|(left, _)| left).sum();
+        let sides =
+            pieces.iter().fold([Side::EMPTY; 2], |[a, b], (_, [c, d])| [a.union(*c), b.union(*d)]);
+        let n = refs.len();
+        let piece = |i: usize| (i * CHUNK, i * CHUNK + pieces[i].0, n.min((i + 1) * CHUNK));
+        // Stretches of the right side in front of the middle, and of the left one behind it.
+        let in_front = (0..pieces.len())
+            .map(|i| (piece(i).1, piece(i).2.min(middle)))
+            .filter(|(from, to)| from < to);
+        let mut behind = (0..pieces.len())
+            .map(|i| (piece(i).0.max(middle), piece(i).1))
+            .filter(|(from, to)| from < to);
+        let (front, back) = refs.split_at_mut(middle);
+        let (mut from, mut to) = (0, 0);
+        for (mut a, end) in in_front {
+            while a < end {
+                if from == to {
+                    (from, to) = behind.next().expect("as many are wrong on either side");
+                }
+                let len = (end - a).min(to - from);
+                front[a..a + len].swap_with_slice(&mut back[from - middle..from - middle + len]);
+                (a, from) = (a + len, from + len);
+            }
+        }
+        (middle, sides)
+    }
+
+    fn apply<'p>(&self, part: Part<'p>) -> [Part<'p>; 2] {
+        let (middle, sides) = if part.refs.len() < PARALLEL {
+            self.partition(part.refs)
+        } else {
+            self.partition_in_parallel(part.refs)
+        };
+        let start = part.start;
+        let (left, right) = part.refs.split_at_mut(middle);
+        let part = |refs, start, Side { bounds, centers }| Part { refs, start, bounds, centers };
+        let [a, b] = sides;
+        [part(left, start, a), part(right, start + middle, b)]
+    }
+}
+
+/// Splits a part in the middle of what order it is in.
+fn halves(part: Part) -> [Part; 2] {
+    let middle = part.refs.len() / 2;
+    let (left, right) = part.refs.split_at_mut(middle);
+    [Part::new(left, part.start), Part::new(right, part.start + middle)]
+}

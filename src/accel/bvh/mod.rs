@@ -1,0 +1,271 @@
+//! Our own hierarchy behind the seam: eight boxes to a node, eight triangles to a leaf, each tested at
+//! once with the widest instructions that the processor has.
+//!
+//! It owns how the tree is built and traversed. Triangles are copied into leaves, in the order of lanes;
+//! shapes are solved by themselves, in f64.
+
+mod build;
+mod group;
+mod node;
+mod packet;
+mod ray;
+mod simd;
+#[cfg(test)]
+mod tests;
+mod traverse;
+mod triangle;
+mod watch;
+
+use rayon::prelude::*;
+
+use super::block::{HitBlock, LANES, RayBlock};
+use super::world::{CopyRef, World};
+use super::{AccelError, AccelInfo, BuildOptions, BuildQuality, Hit, Precision, RayQuery};
+use crate::math::Ray;
+use group::{Copy, GroupTree, RootItems};
+use packet::Packet;
+use simd::{Isa, Kernel, Simd};
+use traverse::Found;
+use watch::Watch;
+
+/// A hierarchy over a world.
+#[derive(Debug)]
+pub struct BvhAccel {
+    root: GroupTree,
+    prototypes: Vec<GroupTree>,
+    copies: Vec<Copy>,
+    isa: Isa,
+    is_robust: bool,
+}
+
+impl BvhAccel {
+    /// Builds prototypes first, then the world around them. The tree does not depend on the number of
+    /// threads.
+    ///
+    /// # Errors
+    /// [`AccelError`] where the memory limit would be exceeded, `progress` returns false, or there are too
+    /// many primitives to number.
+    pub fn build(
+        world: &World,
+        options: &BuildOptions,
+        progress: &(dyn Fn(f64) -> bool + Sync),
+    ) -> Result<Self, AccelError> {
+        let build = || Self::build_here(world, options, progress);
+        // Where there is no pool to be had, with what threads there are.
+        match options.threads.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build()) {
+            Some(Ok(pool)) => pool.install(build),
+            _ => build(),
+        }
+    }
+
+    fn build_here(
+        world: &World,
+        options: &BuildOptions,
+        progress: &(dyn Fn(f64) -> bool + Sync),
+    ) -> Result<Self, AccelError> {
+        let bins = match options.quality {
+            BuildQuality::Low => 8,
+            BuildQuality::Auto | BuildQuality::Medium | BuildQuality::High => 32,
+        };
+        let groups = world.prototypes.iter().chain([&world.root]);
+        let primitives = groups.flat_map(|group| &group.geometries).map(|g| g.len() as u64).sum();
+        let watch = Watch::new(primitives, options.memory_limit, progress);
+        watch.check()?;
+        let prototypes = world.prototypes.par_iter().map(|group| {
+            let built = GroupTree::build(group, &[], bins, &watch)?;
+            watch.hold(built.tree.bytes())?;
+            Ok(built)
+        });
+        let prototypes = prototypes.collect::<Result<Vec<_>, AccelError>>()?;
+
+        let count: u64 = world.sets.iter().map(|set| set.transforms.len() as u64).sum();
+        watch.hold(count * size_of::<Copy>() as u64)?;
+        let copies: Vec<_> = (0u32..)
+            .zip(&world.sets)
+            .flat_map(|(set, s)| {
+                let ids = (0..s.transforms.len() as u32).map(move |index| CopyRef { set, index });
+                ids.zip(std::iter::repeat(s.prototype))
+            })
+            .filter_map(|(id, prototype)| Copy::new(id, prototype, world, &prototypes))
+            .collect();
+        let root = GroupTree::build(&world.root, &copies, bins, &watch)?;
+        watch.hold(root.tree.bytes())?;
+        Ok(Self {
+            root,
+            prototypes,
+            copies: copies.into_iter().map(|(copy, _)| copy).collect(),
+            isa: Isa::detect(),
+            is_robust: options.precision == Precision::Robust,
+        })
+    }
+
+    /// Name, instruction set and memory, for reports and file headers.
+    pub fn info(&self) -> AccelInfo {
+        let trees = self.prototypes.iter().chain([&self.root]).map(|group| group.tree.bytes());
+        AccelInfo {
+            name: "BVH".into(),
+            isa: self.isa.name(),
+            packet_width: LANES,
+            bytes: trees.sum::<u64>() + (self.copies.len() * size_of::<Copy>()) as u64,
+        }
+    }
+
+    /// Our ids for those of the trees.
+    #[inline]
+    fn hit(&self, found: &Found) -> Hit {
+        let (copy, group) = match found.copy {
+            Found::NO_COPY => (None, &self.root),
+            index => {
+                let copy = &self.copies[index as usize];
+                (Some(copy.id), &self.prototypes[copy.prototype as usize])
+            }
+        };
+        let (_, geometry, primitive) = group.primitive(found.id);
+        // Weights are rounded, and their sum with them.
+        let u = found.u.clamp(0.0, 1.0);
+        let v = found.v.clamp(0.0, 1.0 - u);
+        Hit { t: found.t, u, v, primitive, geometry, copy }
+    }
+
+    fn items<const ROBUST: bool>(&self) -> RootItems<'_, ROBUST> {
+        RootItems { root: &self.root, prototypes: &self.prototypes, copies: &self.copies }
+    }
+
+    #[inline(always)]
+    fn any<const OPAQUE: bool>(&self, ray: &Ray) -> bool {
+        if self.is_robust {
+            self.isa.run(Any::<true, OPAQUE> { accel: self, ray })
+        } else {
+            self.isa.run(Any::<false, OPAQUE> { accel: self, ray })
+        }
+    }
+
+    #[inline(always)]
+    fn any_of_block<const OPAQUE: bool>(&self, rays: &RayBlock) -> u16 {
+        if self.is_robust {
+            self.isa.run(AnyOfBlock::<true, OPAQUE> { accel: self, rays })
+        } else {
+            self.isa.run(AnyOfBlock::<false, OPAQUE> { accel: self, rays })
+        }
+    }
+}
+
+impl RayQuery for BvhAccel {
+    #[inline]
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let found = if self.is_robust {
+            self.isa.run(Closest::<true> { accel: self, ray })
+        } else {
+            self.isa.run(Closest::<false> { accel: self, ray })
+        };
+        found.map(|found| self.hit(&found))
+    }
+
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.any::<false>(ray)
+    }
+
+    #[inline]
+    fn occluded_by_opaque(&self, ray: &Ray) -> bool {
+        self.any::<true>(ray)
+    }
+
+    #[inline]
+    fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
+        if self.is_robust {
+            self.isa.run(ClosestOfBlock::<true> { accel: self, rays })
+        } else {
+            self.isa.run(ClosestOfBlock::<false> { accel: self, rays })
+        }
+    }
+
+    #[inline]
+    fn occluded_block(&self, rays: &RayBlock) -> u16 {
+        self.any_of_block::<false>(rays)
+    }
+
+    #[inline]
+    fn occluded_by_opaque_block(&self, rays: &RayBlock) -> u16 {
+        self.any_of_block::<true>(rays)
+    }
+}
+
+struct Closest<'a, const ROBUST: bool> {
+    accel: &'a BvhAccel,
+    ray: &'a Ray,
+}
+
+impl<const ROBUST: bool> Kernel for Closest<'_, ROBUST> {
+    type Output = Option<Found>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Option<Found> {
+        let items = self.accel.items::<ROBUST>();
+        traverse::closest::<S, ROBUST>(simd, &self.accel.root.tree, items, self.ray)
+    }
+}
+
+struct Any<'a, const ROBUST: bool, const OPAQUE: bool> {
+    accel: &'a BvhAccel,
+    ray: &'a Ray,
+}
+
+impl<const ROBUST: bool, const OPAQUE: bool> Kernel for Any<'_, ROBUST, OPAQUE> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> bool {
+        let items = self.accel.items::<ROBUST>();
+        traverse::any::<S, ROBUST, OPAQUE>(simd, &self.accel.root.tree, items, self.ray)
+    }
+}
+
+struct ClosestOfBlock<'a, const ROBUST: bool> {
+    accel: &'a BvhAccel,
+    rays: &'a RayBlock,
+}
+
+impl<const ROBUST: bool> Kernel for ClosestOfBlock<'_, ROBUST> {
+    type Output = HitBlock;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> HitBlock {
+        let Self { accel, rays } = self;
+        let Some(mut packet) = Packet::new::<ROBUST>(rays) else {
+            return HitBlock::from_fn(rays.active(), |lane| {
+                let ray = &rays.get(lane);
+                simd.run(Closest::<ROBUST> { accel, ray }).map(|found| accel.hit(&found))
+            });
+        };
+        let tree = &accel.root.tree;
+        let best =
+            packet::closest::<S, ROBUST>(simd, tree, accel.items::<ROBUST>(), rays, &mut packet);
+        HitBlock::from_fn(rays.active(), |lane| best[lane].if_any().map(|found| accel.hit(&found)))
+    }
+}
+
+struct AnyOfBlock<'a, const ROBUST: bool, const OPAQUE: bool> {
+    accel: &'a BvhAccel,
+    rays: &'a RayBlock,
+}
+
+impl<const ROBUST: bool, const OPAQUE: bool> Kernel for AnyOfBlock<'_, ROBUST, OPAQUE> {
+    type Output = u16;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> u16 {
+        let Self { accel, rays } = self;
+        let Some(mut packet) = Packet::new::<ROBUST>(rays) else {
+            return rays
+                .lanes()
+                .filter(|lane| {
+                    let ray = &rays.get(*lane);
+                    simd.run(Any::<ROBUST, OPAQUE> { accel, ray })
+                })
+                .fold(0, |bits, lane| bits | 1 << lane);
+        };
+        let (tree, items) = (&accel.root.tree, accel.items::<ROBUST>());
+        packet::any::<S, ROBUST, OPAQUE>(simd, tree, items, rays, &mut packet)
+    }
+}

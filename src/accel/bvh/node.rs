@@ -1,0 +1,117 @@
+//! How the tree lies in memory.
+
+/// Children of a node, triangles of a leaf.
+pub(super) const WIDTH: usize = 8;
+
+/// The boxes of eight children side by side, and what is in them.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// By axis, the lower and the upper planes. Empty places have +∞ and −∞: no ray meets them.
+    pub(super) planes: [[[f32; WIDTH]; 2]; 3],
+    pub(super) children: [Child; WIDTH],
+}
+
+/// What is in a box: a node, a block of triangles, or an item that is solved by itself (a shape or a copy).
+/// The index of one of these, under two bits that tell which.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(transparent)]
+pub(super) struct Child(pub(super) u32);
+
+/// A child, told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Content {
+    Node(usize),
+    Triangles(usize),
+    Item(u32),
+}
+
+impl Child {
+    /// Indices are below this.
+    pub(super) const LIMIT: usize = 1 << 30;
+    const TRIANGLES: u32 = 1 << 31;
+    const ITEM: u32 = 1 << 30;
+    const INDEX: u32 = Self::ITEM - 1;
+
+    pub(super) const fn node(index: usize) -> Self {
+        debug_assert!(index < Self::LIMIT);
+        Self(index as u32)
+    }
+
+    pub(super) const fn triangles(block: usize) -> Self {
+        debug_assert!(block < Self::LIMIT);
+        Self(block as u32 | Self::TRIANGLES)
+    }
+
+    pub(super) const fn item(index: u32) -> Self {
+        debug_assert!((index as usize) < Self::LIMIT);
+        Self(index | Self::ITEM)
+    }
+
+    #[inline(always)]
+    pub(super) const fn is_node(self) -> bool {
+        self.0 < Self::ITEM
+    }
+
+    #[inline(always)]
+    pub(super) const fn content(self) -> Content {
+        let index = self.0 & Self::INDEX;
+        if self.is_node() {
+            Content::Node(index as usize)
+        } else if self.0 & Self::TRIANGLES != 0 {
+            Content::Triangles(index as usize)
+        } else {
+            Content::Item(index)
+        }
+    }
+}
+
+impl Node {
+    pub(super) const EMPTY: Self = Self {
+        planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3],
+        children: [Child(0); WIDTH],
+    };
+
+    pub(super) fn set(&mut self, lane: usize, lower: [f32; 3], upper: [f32; 3], child: Child) {
+        for axis in 0..3 {
+            self.planes[axis][0][lane] = lower[axis];
+            self.planes[axis][1][lane] = upper[axis];
+        }
+        self.children[lane] = child;
+    }
+
+    /// Whether a child is there.
+    pub(super) fn is_set(&self, lane: usize) -> bool {
+        self.planes[0][0][lane] <= self.planes[0][1][lane]
+    }
+}
+
+/// Up to eight triangles side by side.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct TriangleBlock {
+    /// By axis, then by corner. Places without a triangle repeat one that is there.
+    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
+    /// Numbers of the primitives in their tree.
+    pub(super) ids: [u32; WIDTH],
+}
+
+/// A hierarchy over the primitives of one group.
+#[derive(Debug, Default)]
+pub(super) struct Tree {
+    /// The first is the root; none where there is nothing in it.
+    pub(super) nodes: Vec<Node>,
+    pub(super) blocks: Vec<TriangleBlock>,
+    /// Items without end, which every ray is tested against.
+    pub(super) endless: Vec<u32>,
+}
+
+impl Tree {
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> u64 {
+        let bytes = self.nodes.len() * size_of::<Node>()
+            + self.blocks.len() * size_of::<TriangleBlock>()
+            + self.endless.len() * size_of::<u32>();
+        bytes as u64
+    }
+}

@@ -1,0 +1,309 @@
+//! Sixteen rays that run close together through a tree.
+//!
+//! A node's eight boxes are tested at once against all that the rays could be: intervals of origins and
+//! reciprocal directions. Source: Wald, Boulos, Shirley, *Ray tracing deformable scenes using dynamic
+//! bounding volume hierarchies*, TOG 26(1), 2007. The box of what is visited next is tested against the
+//! sixteen rays; at a leaf, each that meets it is tested as a single ray is: with the same results to the
+//! last bit.
+
+use super::super::block::{LANES, RayBlock, lanes_of};
+use super::node::{Content, Node, Tree, WIDTH};
+use super::ray::RaySetup;
+use super::simd::{Floats, Simd, Stack};
+use super::traverse::{Found, Items, STACK, ask};
+use super::triangle::ShearRay;
+
+/// The rays of a block whose directions have the same signs.
+pub(super) struct Packet {
+    rays: [RaySetup; LANES],
+    active: u16,
+    origin: [[f32; LANES]; 3],
+    near: [[f32; LANES]; 3],
+    far: [[f32; LANES]; 3],
+    t_min: [f32; LANES],
+    /// Negative infinity where nothing is looked for (any more).
+    t_max: [f32; LANES],
+    /// By axis, for the plane that is entered first and then for the other: the end of the interval of
+    /// origins that counts, and both ends of that of reciprocals.
+    intervals: [[[f32; 3]; 2]; 3],
+    sign: [usize; 3],
+    least_t: f32,
+}
+
+impl Packet {
+    /// None where signs differ.
+    #[inline(always)]
+    pub(super) fn new<const ROBUST: bool>(block: &RayBlock) -> Option<Self> {
+        let mut packet = Self {
+            rays: [RaySetup::NOTHING; LANES],
+            active: 0,
+            origin: [[0.0; LANES]; 3],
+            near: [[0.0; LANES]; 3],
+            far: [[0.0; LANES]; 3],
+            t_min: [0.0; LANES],
+            t_max: [f32::NEG_INFINITY; LANES],
+            intervals: [[[0.0; 3]; 2]; 3],
+            sign: [0; 3],
+            least_t: 0.0,
+        };
+        let mut sign = None;
+        for lane in block.lanes() {
+            let Some(setup) = RaySetup::new::<ROBUST>(&block.get(lane)) else { continue };
+            if *sign.get_or_insert(setup.sign) != setup.sign {
+                return None;
+            }
+            for axis in 0..3 {
+                packet.origin[axis][lane] = setup.origin[axis];
+                packet.near[axis][lane] = setup.near[axis];
+                packet.far[axis][lane] = setup.far[axis];
+            }
+            packet.t_min[lane] = setup.t_min;
+            packet.t_max[lane] = setup.t_max;
+            packet.active |= 1 << lane;
+            packet.rays[lane] = setup;
+        }
+        packet.sign = sign.unwrap_or_default();
+        // Lanes without a ray repeat one that is there.
+        let first = packet.active.trailing_zeros() as usize % LANES;
+        for lane in lanes_of(!packet.active) {
+            for axis in 0..3 {
+                packet.origin[axis][lane] = packet.origin[axis][first];
+                packet.near[axis][lane] = packet.near[axis][first];
+                packet.far[axis][lane] = packet.far[axis][first];
+            }
+            packet.t_min[lane] = packet.t_min[first];
+        }
+        packet.least_t = least(&packet.t_min);
+        for axis in 0..3 {
+            let (near, far) = (&packet.near[axis], &packet.far[axis]);
+            let (lower, upper) = (least(&packet.origin[axis]), most(&packet.origin[axis]));
+            let ends = if packet.sign[axis] == 0 { [upper, lower] } else { [lower, upper] };
+            packet.intervals[axis] =
+                [[ends[0], least(near), most(near)], [ends[1], least(far), most(far)]];
+        }
+        Some(packet)
+    }
+
+    /// The furthest that any ray goes.
+    #[inline(always)]
+    fn furthest(&self) -> f32 {
+        most(&self.t_max)
+    }
+
+    /// Calls `visit` for each leaf that rays meet, the nearest first, with their lanes, until it returns
+    /// false.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
+    fn traverse<S: Simd>(
+        &mut self,
+        simd: S,
+        tree: &Tree,
+        mut visit: impl FnMut(&mut Self, Content, u16) -> bool,
+    ) {
+        if tree.nodes.is_empty() || self.active == 0 {
+            return;
+        }
+        let mut intervals = [[[simd.splat8(0.0); 3]; 2]; 3];
+        for axis in 0..3 {
+            for side in 0..2 {
+                for end in 0..3 {
+                    intervals[axis][side][end] = simd.splat8(self.intervals[axis][side][end]);
+                }
+            }
+        }
+        let least_t = simd.splat8(self.least_t);
+        let sign = self.sign;
+        let mut furthest = self.furthest();
+        let mut stack = Stack::<STACK>::new();
+        let mut index = 0;
+        loop {
+            let node = &tree.nodes[index];
+            let (mut near, mut far) = (least_t, simd.splat8(furthest));
+            for axis in 0..3 {
+                let [[origin, a, b], [far_origin, c, d]] = intervals[axis];
+                let way = simd.load8(&node.planes[axis][sign[axis] & 1]).sub(origin);
+                near = near.max(way.mul(a).min(way.mul(b)));
+                let way = simd.load8(&node.planes[axis][sign[axis] & 1 ^ 1]).sub(far_origin);
+                far = far.min(way.mul(c).max(way.mul(d)));
+            }
+            let mut bits = near.le(far);
+            if bits != 0 {
+                let near = near.to_array();
+                let start = stack.len();
+                while bits != 0 {
+                    let lane = bits.trailing_zeros() as usize & 7;
+                    bits &= bits - 1;
+                    let slot = (index * WIDTH + lane) as u64;
+                    stack.push(u64::from(near[lane].to_bits()) << 32 | slot);
+                }
+                super::traverse::sort(stack.since(start));
+            }
+            // On to the next node, by way of leaves.
+            index = loop {
+                let Some(entry) = stack.pop() else { return };
+                if f32::from_bits((entry >> 32) as u32) > furthest {
+                    continue;
+                }
+                let (parent, lane) = ((entry as u32) as usize / WIDTH, entry as usize % WIDTH);
+                let node = &tree.nodes[parent];
+                let content = node.children[lane].content();
+                let lanes = self.lanes_that_meet(simd, node, lane);
+                if lanes == 0 {
+                    continue;
+                }
+                if let Content::Node(index) = content {
+                    break index;
+                }
+                if !visit(self, content, lanes) {
+                    return;
+                }
+                furthest = self.furthest();
+            };
+        }
+    }
+
+    /// Where each ray passes the planes of a child that are entered (`side` 0) or left (1) by, by axis.
+    #[inline(always)]
+    fn lane_times<S: Simd>(
+        &self,
+        simd: S,
+        node: &Node,
+        child: usize,
+        reciprocals: &[[f32; LANES]; 3],
+        side: usize,
+    ) -> [S::F16; 3] {
+        let mut times = [simd.splat16(0.0); 3];
+        for axis in 0..3 {
+            let plane = simd.splat16(node.planes[axis][self.sign[axis] & 1 ^ side][child]);
+            let way = plane.sub(simd.load16(&self.origin[axis]));
+            times[axis] = way.mul(simd.load16(&reciprocals[axis]));
+        }
+        times
+    }
+
+    /// The rays that meet the box of a child.
+    #[inline(always)]
+    fn lanes_that_meet<S: Simd>(&self, simd: S, node: &Node, child: usize) -> u16 {
+        let near = self.lane_times(simd, node, child, &self.near, 0);
+        let far = self.lane_times(simd, node, child, &self.far, 1);
+        let enter = near[0].max(near[1]).max(near[2].max(simd.load16(&self.t_min)));
+        let exit = far[0].min(far[1]).min(far[2].min(simd.load16(&self.t_max)));
+        enter.le(exit) as u16
+    }
+}
+
+/// The least of the lanes, in halves, as the compiler makes lanes of it.
+#[inline(always)]
+fn least(values: &[f32; LANES]) -> f32 {
+    let mut v = *values;
+    for half in [8, 4, 2, 1] {
+        for i in 0..half {
+            v[i] = if v[i] < v[i + half] { v[i] } else { v[i + half] };
+        }
+    }
+    v[0]
+}
+
+/// The greatest of them.
+#[inline(always)]
+fn most(values: &[f32; LANES]) -> f32 {
+    let mut v = *values;
+    for half in [8, 4, 2, 1] {
+        for i in 0..half {
+            v[i] = if v[i] > v[i + half] { v[i] } else { v[i + half] };
+        }
+    }
+    v[0]
+}
+
+/// The closest hit of each ray, as [`super::traverse::closest`] finds it.
+#[inline(always)]
+pub(super) fn closest<S: Simd, const ROBUST: bool>(
+    simd: S,
+    tree: &Tree,
+    items: impl Items,
+    block: &RayBlock,
+    packet: &mut Packet,
+) -> [Found; LANES] {
+    let mut best = [Found::nothing(0.0); LANES];
+    for lane in lanes_of(packet.active) {
+        best[lane] = Found::nothing(packet.t_max[lane]);
+        for &item in &tree.endless {
+            ask(simd, items, item, &block.get(lane), &mut best[lane]);
+        }
+        packet.t_max[lane] = best[lane].t;
+    }
+    packet.traverse(simd, tree, |packet, content, lanes| {
+        for lane in lanes_of(lanes) {
+            let lane = lane % LANES;
+            let best = &mut best[lane];
+            match content {
+                Content::Node(_) => {}
+                Content::Triangles(index) => {
+                    let triangles = &tree.blocks[index];
+                    let shear = ShearRay::new(simd, &packet.rays[lane]);
+                    shear.each_hit::<S, ROBUST>(simd, triangles, best.t, |i, hit| {
+                        let found = Found::triangle(hit, triangles.ids[i]);
+                        if found.is_before(best) {
+                            *best = found;
+                        }
+                        false
+                    });
+                }
+                Content::Item(item) => ask(simd, items, item, &block.get(lane), best),
+            }
+            packet.t_max[lane] = best.t;
+        }
+        true
+    });
+    best
+}
+
+/// Which rays hit anything, as [`super::traverse::any`] finds it.
+#[inline(always)]
+pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
+    simd: S,
+    tree: &Tree,
+    items: impl Items,
+    block: &RayBlock,
+    packet: &mut Packet,
+) -> u16 {
+    let mut occluded = 0;
+    for lane in lanes_of(packet.active) {
+        let ray = block.get(lane);
+        if tree.endless.iter().any(|&item| items.occluded::<S, OPAQUE>(simd, item, &ray)) {
+            occluded |= 1 << lane;
+            packet.t_max[lane] = f32::NEG_INFINITY;
+        }
+    }
+    if occluded == packet.active {
+        return occluded;
+    }
+    packet.traverse(simd, tree, |packet, content, lanes| {
+        for lane in lanes_of(lanes) {
+            let lane = lane % LANES;
+            let (ray, setup) = (&block.get(lane), &packet.rays[lane]);
+            let mut is_hit = false;
+            match content {
+                Content::Node(_) => {}
+                Content::Triangles(index) => {
+                    let triangles = &tree.blocks[index];
+                    let shear = ShearRay::new(simd, setup);
+                    shear.each_hit::<S, ROBUST>(simd, triangles, setup.t_max, |i, _| {
+                        is_hit = !(OPAQUE && items.is_clear(triangles.ids[i]));
+                        is_hit
+                    });
+                }
+                Content::Item(item) => {
+                    is_hit = items.occluded::<S, OPAQUE>(simd, item, ray);
+                }
+            }
+            if is_hit {
+                occluded |= 1 << lane;
+                packet.t_max[lane] = f32::NEG_INFINITY;
+            }
+        }
+        occluded != packet.active
+    });
+    occluded
+}

@@ -1,0 +1,256 @@
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3, Vec3};
+
+use super::BvhAccel;
+use super::node::Child;
+#[cfg(target_arch = "x86_64")]
+use super::simd::{Avx2, Avx512};
+use super::simd::{Floats, Isa, Portable, Simd};
+use crate::accel::{
+    AccelError, BruteForce, BuildOptions, Geometry, Group, InstanceSet, Precision, RayQuery, World,
+    rows_from_affine,
+};
+use crate::geometry::{Plane, TriangleMesh};
+use crate::math::Ray;
+
+fn numbers(seed: u32) -> impl FnMut() -> f32 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+    }
+}
+
+/// Every operation, compared with plain arithmetic; fused ones by bounds.
+fn check<F: Floats<Array = [f32; N]>, const N: usize>(load: impl Fn(&[f32; N]) -> F) {
+    let mut next = numbers(N as u32);
+    for _ in 0..200 {
+        let [a, b, c]: [[f32; N]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+        let same = |f: F, expected: &dyn Fn(usize) -> f32| {
+            assert_eq!(f.to_array(), std::array::from_fn(expected));
+        };
+        let (x, y, z) = (load(&a), load(&b), load(&c));
+        same(x.add(y), &|i| a[i] + b[i]);
+        same(x.sub(y), &|i| a[i] - b[i]);
+        same(x.mul(y), &|i| a[i] * b[i]);
+        same(x.div(y), &|i| a[i] / b[i]);
+        same(x.min(y), &|i| a[i].min(b[i]));
+        same(x.max(y), &|i| a[i].max(b[i]));
+        let near = |f: F, expected: &dyn Fn(usize) -> f32| {
+            for (i, x) in f.to_array().into_iter().enumerate() {
+                assert!((x - expected(i)).abs() <= 2.4e-7, "{x} and {}", expected(i));
+            }
+        };
+        near(x.mul_add(y, z), &|i| a[i] * b[i] + c[i]);
+        near(x.mul_sub(y, z), &|i| a[i] * b[i] - c[i]);
+        near(x.neg_mul_add(y, z), &|i| c[i] - a[i] * b[i]);
+        let le = (0..N).fold(0, |bits, i| bits | u32::from(a[i] <= b[i]) << i);
+        assert_eq!(x.le(y), le);
+        assert_eq!(x.le(x), (1 << N) - 1);
+    }
+    let nan = load(&[f32::NAN; N]);
+    assert_eq!(nan.le(nan), 0);
+}
+
+fn check_isa(simd: impl Simd) {
+    check(|x| simd.load8(x));
+    check(|x| simd.load16(x));
+    assert_eq!(simd.splat8(2.5).to_array(), [2.5; 8]);
+    assert_eq!(simd.splat16(2.5).to_array(), [2.5; 16]);
+}
+
+/// Each instruction set that the processor has.
+#[test]
+fn lanes_do_what_numbers_do() {
+    check_isa(Portable);
+    #[cfg(target_arch = "x86_64")]
+    {
+        if let Some(avx2) = Avx2::detect() {
+            check_isa(avx2);
+        }
+        if let Some(avx512) = Avx512::detect() {
+            check_isa(avx512);
+        }
+    }
+}
+
+fn world(mesh: TriangleMesh) -> World {
+    let root = Group { geometries: vec![Geometry::Mesh(mesh)], ..Group::default() };
+    World { root, ..World::default() }
+}
+
+/// A wavy field of 2 n² triangles over [−1, 1]², scaled and moved.
+fn field(n: u32, scale: f32, offset: Vec3) -> TriangleMesh {
+    let at = |i: u32| 2.0 * i as f32 / n as f32 - 1.0;
+    let point = |i: u32, j: u32| {
+        let (x, z) = (at(i), at(j));
+        offset + scale * Vec3::new(x, 0.2 * (7.0 * x).sin() * (5.0 * z).cos(), z)
+    };
+    let xyz = (0..=n).flat_map(|j| (0..=n).flat_map(move |i| point(i, j).to_array())).collect();
+    let quads = (0..n).flat_map(|j| (0..n).map(move |i| j * (n + 1) + i));
+    TriangleMesh::new(
+        xyz,
+        quads.flat_map(|a| [[a, a + n + 1, a + n + 2], [a, a + n + 2, a + 1]]).collect(),
+    )
+}
+
+fn built(world: &World, isa: Option<Isa>, threads: Option<usize>) -> BvhAccel {
+    let options = BuildOptions { threads, ..BuildOptions::default() };
+    let mut accel = BvhAccel::build(world, &options, &|_| true).unwrap();
+    accel.isa = isa.unwrap_or(accel.isa);
+    accel
+}
+
+/// 80,000 triangles: enough for boxes that several threads split.
+#[test]
+fn the_tree_does_not_depend_on_the_number_of_threads() {
+    let world = world(field(200, 1.0, Vec3::ZERO));
+    let [one, four] = [1, 4].map(|n| built(&world, None, Some(n)).root.tree);
+    assert_eq!(format!("{:?}", one.nodes), format!("{:?}", four.nodes));
+    let ids = |tree: &super::node::Tree| tree.blocks.iter().flat_map(|b| b.ids).collect::<Vec<_>>();
+    assert_eq!(ids(&one), ids(&four));
+    let mut all = ids(&one);
+    all.sort_unstable();
+    all.dedup();
+    assert_eq!(all.len(), 80_000, "every triangle is in a leaf");
+}
+
+/// Scales and offsets; the portable code as well as what is detected.
+#[test]
+fn hits_are_the_oracles_at_any_scale() {
+    for (scale, offset) in
+        [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e3), (10.0, 1e6), (1e-6, 1e-3)]
+    {
+        let offset = Vec3::splat(offset);
+        let world = world(field(24, scale, offset));
+        let oracle = BruteForce::new(&world);
+        for isa in [Some(Isa::Portable(Portable)), None] {
+            let accel = built(&world, isa, None);
+            let mut next = numbers(3);
+            for _ in 0..400 {
+                let target = offset + scale * 0.9 * Vec3::new(next(), 0.0, next());
+                let origin = target + scale * Vec3::new(next(), 1.0, next());
+                let ray = Ray::new(origin, target - origin);
+                let (expected, hit) = (oracle.intersect(&ray), accel.intersect(&ray));
+                // An ulp of the offset may put the ray beside a slope's edge, not beside the field.
+                let (Some(e), Some(h)) = (expected, hit) else {
+                    panic!("{scale} {offset}: {ray:?}")
+                };
+                assert!((e.t - h.t).abs() < 2e-5, "{scale} {offset}: {e:?} {h:?}");
+                assert!(accel.occluded(&ray));
+            }
+        }
+    }
+}
+
+/// Straight down on vertices and along cell borders within a mesh (on its outermost border a ray that runs
+/// along a box may still be lost): no box is lost to 0 · ∞.
+#[test]
+fn rays_along_the_axes_hit() {
+    let n = 32;
+    let flat = {
+        let mut mesh = field(n, 1.0, Vec3::ZERO);
+        mesh.positions.as_flat_mut().iter_mut().skip(1).step_by(3).for_each(|y| *y = 0.0);
+        mesh
+    };
+    let world = world(flat);
+    {
+        let precision = Precision::Robust;
+        let options = BuildOptions { precision, ..BuildOptions::default() };
+        let accel = BvhAccel::build(&world, &options, &|_| true).unwrap();
+        for i in 1..2 * n {
+            for j in 1..2 * n {
+                let [x, z] = [i, j].map(|i| i as f32 / n as f32 - 1.0);
+                for direction in [Vec3::NEG_Y, Vec3::new(-0.0, -1.0, -0.0)] {
+                    let hit = accel.intersect(&Ray::new(Vec3::new(x, 2.0, z), direction));
+                    assert_eq!(hit.map(|h| h.t), Some(2.0), "{precision:?}: {x} {z}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn senseless_rays_and_triangles_miss() {
+    let mut mesh = field(8, 1.0, Vec3::ZERO);
+    mesh.positions.as_flat_mut()[3 * 40] = f32::NAN;
+    mesh.positions.as_flat_mut()[3 * 41 + 1] = f32::INFINITY;
+    let accel = built(&world(mesh), None, None);
+    let down = Ray::new(Vec3::new(0.77, 2.0, 0.77), Vec3::NEG_Y);
+    assert!(accel.intersect(&down).is_some());
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let origin = Ray { origin: Vec3::new(bad, 2.0, 0.0), ..down };
+        let direction = Ray { direction: Vec3::new(0.0, bad, 0.0), ..down };
+        for ray in [origin, direction] {
+            assert!(accel.intersect(&ray).is_none() && !accel.occluded(&ray), "{ray:?}");
+        }
+    }
+    let t_nan = Ray { t_max: f32::NAN, ..down };
+    let zero = Ray { direction: Vec3::ZERO, ..down };
+    let empty = Ray { t_min: 3.0, t_max: 1.0, ..down };
+    for ray in [zero, empty, Ray { t_min: f32::NAN, ..down }] {
+        assert!(accel.intersect(&ray).is_none() && !accel.occluded(&ray), "{ray:?}");
+    }
+    let _ = accel.intersect(&t_nan);
+}
+
+/// Triangles whose sizes grow geometrically, and many in one place, end neither stack nor build.
+#[test]
+fn trees_stay_shallow() {
+    let mut xyz = Vec::new();
+    for i in 0..1200 {
+        let s = (if i < 240 { (i as f32 - 120.0) * 0.5 } else { 1.0 }).exp2();
+        xyz.extend([0.0, 0.0, 0.0, s, 0.0, 0.0, 0.0, s, 0.0]);
+    }
+    let mesh = TriangleMesh::new(xyz, (0..1200).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect());
+    let accel = built(&world(mesh), None, None);
+    fn depth(nodes: &[super::node::Node], child: Child) -> usize {
+        let super::node::Content::Node(i) = child.content() else { return 0 };
+        let node = &nodes[i];
+        let below =
+            (0..8).filter(|&lane| node.is_set(lane)).map(|lane| depth(nodes, node.children[lane]));
+        1 + below.max().unwrap_or(0)
+    }
+    assert!(depth(&accel.root.tree.nodes, Child::node(0)) <= super::build::MAX_DEPTH);
+    let hit = accel.intersect(&Ray::new(Vec3::new(0.1, 0.1, 1.0), Vec3::NEG_Z)).unwrap();
+    assert!((hit.t - 1.0).abs() < 1e-6);
+}
+
+/// Planes without end, in the root and in a copy, in front of and behind a mesh.
+#[test]
+fn planes_without_end_are_hit() {
+    let plane =
+        |y: f64| Geometry::Shapes(vec![Plane { point: DVec3::Y * y, normal: DVec3::Y }].into());
+    let mesh = Geometry::Mesh(field(8, 1.0, Vec3::ZERO));
+    let row = rows_from_affine(&DAffine3::from_translation(DVec3::Y * -5.0));
+    let world = World {
+        root: Group { geometries: vec![mesh, plane(-3.0)], clear: vec![false, true] },
+        prototypes: vec![Group { geometries: vec![plane(0.0)], ..Group::default() }],
+        sets: vec![InstanceSet { prototype: 0, transforms: Arc::new(vec![row]) }],
+    };
+    let accel = built(&world, None, None);
+    let down = |y: f32| Ray::new(Vec3::new(1e6, y, 0.3), Vec3::NEG_Y);
+    let hit = accel.intersect(&down(1.0)).unwrap();
+    assert_eq!((hit.t, hit.geometry, hit.copy), (4.0, 1, None));
+    let below = accel.intersect(&down(-4.0)).unwrap();
+    assert_eq!((below.t, below.copy.is_some()), (1.0, true));
+    assert!(!accel.occluded_by_opaque(&Ray { t_max: 5.0, ..down(1.0) }));
+    assert!(accel.occluded_by_opaque(&down(1.0)));
+}
+
+#[test]
+fn a_build_is_interrupted_or_refused() {
+    let world = world(field(100, 1.0, Vec3::ZERO));
+    let build = |limit, go: &(dyn Fn(f64) -> bool + Sync)| {
+        let options = BuildOptions { memory_limit: limit, ..BuildOptions::default() };
+        BvhAccel::build(&world, &options, go).map(|_| ())
+    };
+    assert!(matches!(build(None, &|_| false), Err(AccelError::Interrupted)));
+    assert!(matches!(build(None, &|x| x < 0.5), Err(AccelError::Interrupted)));
+    assert!(matches!(
+        build(Some(100_000), &|_| true),
+        Err(AccelError::MemoryLimit { limit: 100_000 })
+    ));
+    assert!(build(Some(10_000_000), &|_| true).is_ok());
+}

@@ -1,0 +1,156 @@
+//! One ray against eight triangles.
+//!
+//! Source: Woop, Benthin, Wald, *Watertight ray/triangle intersection*, JCGT 2(1), 2013. Corners are seen
+//! from the ray's origin and sheared so that the ray runs along an axis; edge functions are then areas in
+//! a plane. Products are rounded before they are subtracted: so the difference has the right sign, or is
+//! zero, and an edge gives its two triangles the same number with opposite sign. Zero counts as inside: a
+//! ray that meets a closed mesh at an edge or a vertex hits at least one triangle there.
+
+use super::node::TriangleBlock;
+use super::ray::RaySetup;
+use super::simd::{Floats, Simd};
+
+/// The ray in every lane, against eight triangles.
+#[derive(Clone, Copy)]
+pub(super) struct ShearRay<F> {
+    /// In the order of `axes`.
+    origin: [F; 3],
+    shear: [F; 2],
+    axes: [usize; 3],
+    /// Length along the last axis to distance.
+    along: f32,
+    t_min: f32,
+}
+
+/// Where one triangle is hit.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TriangleHit {
+    pub(super) t: f32,
+    pub(super) u: f32,
+    pub(super) v: f32,
+}
+
+/// Triangles that the line of a ray meets.
+struct Candidates<F> {
+    /// Lanes.
+    bits: u32,
+    /// The edge functions, and their sum.
+    edges: [F; 3],
+    sum: F,
+    /// By axis, then corner: all that is needed to do it again in f64.
+    sheared: [[F; 3]; 3],
+}
+
+impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
+    #[inline(always)]
+    pub(super) fn new<S: Simd<F8 = F>>(simd: S, ray: &RaySetup) -> Self {
+        let [x, y, z] = ray.pivot;
+        Self {
+            origin: [simd.splat8(x), simd.splat8(y), simd.splat8(z)],
+            shear: [simd.splat8(ray.shear[0]), simd.splat8(ray.shear[1])],
+            axes: ray.axes,
+            along: ray.shear[2],
+            t_min: ray.t_min,
+        }
+    }
+
+    /// Corners as the ray sees them.
+    #[inline(always)]
+    fn sheared<S: Simd<F8 = F>>(
+        &self,
+        simd: S,
+        [xs, ys, zs]: [&[[f32; 8]; 3]; 3],
+        i: usize,
+    ) -> [F; 3] {
+        let x = simd.load8(&xs[i]).sub(self.origin[0]);
+        let y = simd.load8(&ys[i]).sub(self.origin[1]);
+        let z = simd.load8(&zs[i]).sub(self.origin[2]);
+        [self.shear[0].neg_mul_add(z, x), self.shear[1].neg_mul_add(z, y), z]
+    }
+
+    #[inline(always)]
+    fn candidates<S: Simd<F8 = F>, const ROBUST: bool>(
+        &self,
+        simd: S,
+        block: &TriangleBlock,
+    ) -> Candidates<F> {
+        let [kx, ky, kz] = self.axes;
+        let (xs, ys, zs) = (&block.corners[kx], &block.corners[ky], &block.corners[kz]);
+        let corners = [xs, ys, zs];
+        let [ax, ay, az] = self.sheared(simd, corners, 0);
+        let [bx, by, bz] = self.sheared(simd, corners, 1);
+        let [cx, cy, cz] = self.sheared(simd, corners, 2);
+        let u = cross::<F, ROBUST>(cx, cy, bx, by);
+        let v = cross::<F, ROBUST>(ax, ay, cx, cy);
+        let w = cross::<F, ROBUST>(bx, by, ax, ay);
+        let zero = simd.splat8(0.0);
+        let bits = zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero);
+        Candidates {
+            bits,
+            edges: [u, v, w],
+            sum: u.add(v).add(w),
+            sheared: [[ax, bx, cx], [ay, by, cy], [az, bz, cz]],
+        }
+    }
+
+    /// Calls `found` with every triangle hit at t in (`t_min`, `t_max`], until it returns true.
+    #[inline(always)]
+    pub(super) fn each_hit<S: Simd<F8 = F>, const ROBUST: bool>(
+        &self,
+        simd: S,
+        block: &TriangleBlock,
+        t_max: f32,
+        mut found: impl FnMut(usize, TriangleHit) -> bool,
+    ) {
+        let candidates = self.candidates::<S, ROBUST>(simd, block);
+        if candidates.bits == 0 {
+            return;
+        }
+        let Candidates { mut bits, edges: [u, v, w], sum, sheared } = candidates;
+        let [az, bz, cz] = sheared[2];
+        let inverse = simd.splat8(1.0).div(sum);
+        let t = u.mul_add(az, v.mul_add(bz, w.mul(cz))).mul(inverse).mul(simd.splat8(self.along));
+        let (us, vs) = (v.mul(inverse).to_array(), w.mul(inverse).to_array());
+        let (ts, sums) = (t.to_array(), sum.to_array());
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize & 7;
+            bits &= bits - 1;
+            let mut hit = TriangleHit { t: ts[lane], u: us[lane], v: vs[lane] };
+            if ROBUST && sums[lane] == 0.0 {
+                let lanes = sheared.map(|axis| axis.map(|f| f.to_array()[lane]));
+                match exact_hit(&lanes, self.along) {
+                    Some(exact) => hit = exact,
+                    None => continue,
+                }
+            }
+            if hit.t > self.t_min && hit.t <= t_max && found(lane, hit) {
+                return;
+            }
+        }
+    }
+}
+
+/// Twice the area that two corners span with the ray.
+#[inline(always)]
+fn cross<F: Floats, const ROBUST: bool>(ax: F, ay: F, bx: F, by: F) -> F {
+    if ROBUST { ax.mul(by).sub(ay.mul(bx)) } else { ax.mul_sub(by, ay.mul(bx)) }
+}
+
+/// Where all edge functions are zero in f32, they are asked in f64, in which products of f32 are exact.
+#[cold]
+#[inline(never)]
+fn exact_hit([x, y, z]: &[[f32; 3]; 3], along: f32) -> Option<TriangleHit> {
+    let [x, y, z] = [x, y, z].map(|axis| axis.map(f64::from));
+    let u = x[2] * y[1] - y[2] * x[1];
+    let v = x[0] * y[2] - y[0] * x[2];
+    let w = x[1] * y[0] - y[1] * x[0];
+    if !((u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0)) {
+        return None;
+    }
+    let sum = u + v + w;
+    if sum == 0.0 {
+        return None;
+    }
+    let t = (u * z[0] + v * z[1] + w * z[2]) / sum * f64::from(along);
+    Some(TriangleHit { t: t as f32, u: (v / sum) as f32, v: (w / sum) as f32 })
+}
