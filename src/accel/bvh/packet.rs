@@ -18,6 +18,7 @@ pub(super) struct Packet {
     rays: [RaySetup; LANES],
     active: u16,
     origin: [[f32; LANES]; 3],
+    far_origin: [[f32; LANES]; 3],
     near: [[f32; LANES]; 3],
     far: [[f32; LANES]; 3],
     t_min: [f32; LANES],
@@ -38,6 +39,7 @@ impl Packet {
             rays: [RaySetup::NOTHING; LANES],
             active: 0,
             origin: [[0.0; LANES]; 3],
+            far_origin: [[0.0; LANES]; 3],
             near: [[0.0; LANES]; 3],
             far: [[0.0; LANES]; 3],
             t_min: [0.0; LANES],
@@ -54,6 +56,7 @@ impl Packet {
             }
             for axis in 0..3 {
                 packet.origin[axis][lane] = setup.origin[axis];
+                packet.far_origin[axis][lane] = setup.far_origin[axis];
                 packet.near[axis][lane] = setup.near[axis];
                 packet.far[axis][lane] = setup.far[axis];
             }
@@ -68,6 +71,7 @@ impl Packet {
         for lane in lanes_of(!packet.active) {
             for axis in 0..3 {
                 packet.origin[axis][lane] = packet.origin[axis][first];
+                packet.far_origin[axis][lane] = packet.far_origin[axis][first];
                 packet.near[axis][lane] = packet.near[axis][first];
                 packet.far[axis][lane] = packet.far[axis][first];
             }
@@ -76,8 +80,12 @@ impl Packet {
         packet.least_t = least(&packet.t_min);
         for axis in 0..3 {
             let (near, far) = (&packet.near[axis], &packet.far[axis]);
-            let (lower, upper) = (least(&packet.origin[axis]), most(&packet.origin[axis]));
-            let ends = if packet.sign[axis] == 0 { [upper, lower] } else { [lower, upper] };
+            let (origin, far_origin) = (&packet.origin[axis], &packet.far_origin[axis]);
+            let ends = if packet.sign[axis] == 0 {
+                [most(origin), least(far_origin)]
+            } else {
+                [least(origin), most(far_origin)]
+            };
             packet.intervals[axis] =
                 [[ends[0], least(near), most(near)], [ends[1], least(far), most(far)]];
         }
@@ -164,18 +172,13 @@ impl Packet {
 
     /// Where each ray passes the planes of a child that are entered (`side` 0) or left (1) by, by axis.
     #[inline(always)]
-    fn lane_times<S: Simd>(
-        &self,
-        simd: S,
-        node: &Node,
-        child: usize,
-        reciprocals: &[[f32; LANES]; 3],
-        side: usize,
-    ) -> [S::F16; 3] {
+    fn lane_times<S: Simd>(&self, simd: S, node: &Node, child: usize, side: usize) -> [S::F16; 3] {
+        let (origins, reciprocals) =
+            if side == 0 { (&self.origin, &self.near) } else { (&self.far_origin, &self.far) };
         let mut times = [simd.splat16(0.0); 3];
         for axis in 0..3 {
             let plane = simd.splat16(node.planes[axis][self.sign[axis] & 1 ^ side][child]);
-            let way = plane.sub(simd.load16(&self.origin[axis]));
+            let way = plane.sub(simd.load16(&origins[axis]));
             times[axis] = way.mul(simd.load16(&reciprocals[axis]));
         }
         times
@@ -184,8 +187,8 @@ impl Packet {
     /// The rays that meet the box of a child.
     #[inline(always)]
     fn lanes_that_meet<S: Simd>(&self, simd: S, node: &Node, child: usize) -> u16 {
-        let near = self.lane_times(simd, node, child, &self.near, 0);
-        let far = self.lane_times(simd, node, child, &self.far, 1);
+        let near = self.lane_times(simd, node, child, 0);
+        let far = self.lane_times(simd, node, child, 1);
         let enter = near[0].max(near[1]).max(near[2].max(simd.load16(&self.t_min)));
         let exit = far[0].min(far[1]).min(far[2].min(simd.load16(&self.t_max)));
         enter.le(exit) as u16

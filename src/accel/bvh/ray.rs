@@ -7,6 +7,8 @@ use crate::math::Ray;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RaySetup {
     pub(super) origin: [f32; 3],
+    /// The origin for where a slab is left: where the ray runs along the slab, short of it.
+    pub(super) far_origin: [f32; 3],
     /// Reciprocals of the direction, for where a slab is entered and where it is left; finite.
     pub(super) near: [f32; 3],
     pub(super) far: [f32; 3],
@@ -28,10 +30,14 @@ pub(super) struct RaySetup {
 /// *Robust BVH ray traversal*, JCGT 2(2), 2013.
 const MARGIN: f32 = 4.0 * f32::EPSILON;
 
+/// The largest reciprocal.
+const HUGE: f32 = f32::MAX / 4.0;
+
 impl RaySetup {
     /// No ray.
     pub(super) const NOTHING: Self = Self {
         origin: [0.0; 3],
+        far_origin: [0.0; 3],
         near: [0.0; 3],
         far: [0.0; 3],
         sign: [0; 3],
@@ -61,17 +67,22 @@ impl RaySetup {
         let pivot = o.to_array();
         let (o, d) = ([o.x, o.y, o.z], d.to_array());
         let along = 1.0 / d[z];
-        // A component of zero becomes so small a one that the ray is not seen to move, and reciprocals
-        // stay finite: nothing is NaN.
-        let least = longest * 1e-18;
-        let reciprocal = |d: f32| {
-            let r = 1.0 / if d.abs() < least { least.copysign(d) } else { d };
-            r.clamp(-f32::MAX / 2.0, f32::MAX / 2.0)
-        };
-        let r = [ray.direction.x, ray.direction.y, ray.direction.z].map(reciprocal);
+        // Along a slab the reciprocal is huge, but finite, so that nothing is NaN; and the slab is left a
+        // little behind the origin, so that a ray in the very plane of a face is inside for as long as any
+        // ray goes (10¹³ units).
+        let mut far_origin = o;
+        let mut r = d.map(|d| (1.0 / d).clamp(-HUGE, HUGE));
+        for axis in 0..3 {
+            if d[axis].abs() < longest * 1e-18 {
+                r[axis] = HUGE.copysign(d[axis]);
+                let shift = (o[axis].abs() * f32::EPSILON).max(1e-24 / longest.min(1.0));
+                far_origin[axis] -= shift.copysign(d[axis]);
+            }
+        }
         let margin = if ROBUST { MARGIN } else { 0.0 };
         Some(Self {
             origin: o,
+            far_origin,
             near: r.map(|r| r * (1.0 - margin)),
             far: r.map(|r| r * (1.0 + margin)),
             sign: r.map(|r| usize::from(r < 0.0)),
@@ -87,10 +98,10 @@ impl RaySetup {
 /// The ray in every lane, against eight boxes.
 #[derive(Clone, Copy)]
 pub(super) struct SlabRay<F> {
-    /// Times the reciprocal and negated, if not robust.
-    origin: [F; 3],
-    near: [F; 3],
-    far: [F; 3],
+    /// For planes that are entered and planes that are left by. If not robust: times the reciprocal and
+    /// negated.
+    origins: [[F; 3]; 2],
+    reciprocals: [[F; 3]; 2],
     t_min: F,
     sign: [usize; 3],
 }
@@ -99,12 +110,22 @@ impl<F: Floats> SlabRay<F> {
     #[inline(always)]
     pub(super) fn new<S: Simd<F8 = F>, const ROBUST: bool>(simd: S, ray: &RaySetup) -> Self {
         let splat = |[x, y, z]: [f32; 3]| [simd.splat8(x), simd.splat8(y), simd.splat8(z)];
-        let [x, y, z] = ray.origin;
-        let [a, b, c] = ray.near;
+        let mut origins = [ray.origin, ray.far_origin];
+        let mut reciprocals = [ray.near, ray.far];
+        if !ROBUST {
+            // Where a product is huge its rounding is too, and the slab is widened by it.
+            const MOST: f32 = 1e24;
+            for axis in 0..3 {
+                let r = ray.near[axis].clamp(-MOST, MOST);
+                let product = -ray.origin[axis] * r;
+                let wider = if r.abs() == MOST { product.abs() * f32::EPSILON + 1e15 } else { 0.0 };
+                (origins[0][axis], origins[1][axis]) = (product - wider, product + wider);
+                (reciprocals[0][axis], reciprocals[1][axis]) = (r, r);
+            }
+        }
         Self {
-            origin: splat(if ROBUST { ray.origin } else { [-x * a, -y * b, -z * c] }),
-            near: splat(ray.near),
-            far: splat(ray.far),
+            origins: [splat(origins[0]), splat(origins[1])],
+            reciprocals: [splat(reciprocals[0]), splat(reciprocals[1])],
             t_min: simd.splat8(ray.t_min),
             sign: ray.sign,
         }
@@ -118,8 +139,8 @@ impl<F: Floats> SlabRay<F> {
         planes: &[[[f32; 8]; 2]; 3],
         t_max: F,
     ) -> (u32, F) {
-        let near = self.times::<S, ROBUST>(simd, planes, &self.near, 0);
-        let far = self.times::<S, ROBUST>(simd, planes, &self.far, 1);
+        let near = self.times::<S, ROBUST>(simd, planes, 0);
+        let far = self.times::<S, ROBUST>(simd, planes, 1);
         let enter = near[0].max(near[1]).max(near[2].max(self.t_min));
         let exit = far[0].min(far[1]).min(far[2].min(t_max));
         (enter.le(exit), enter)
@@ -131,13 +152,13 @@ impl<F: Floats> SlabRay<F> {
         &self,
         simd: S,
         planes: &[[[f32; 8]; 2]; 3],
-        reciprocals: &[F; 3],
         side: usize,
     ) -> [F; 3] {
+        let (origins, reciprocals) = (&self.origins[side], &self.reciprocals[side]);
         let mut times = *reciprocals;
         for axis in 0..3 {
             let plane = simd.load8(&planes[axis][self.sign[axis] & 1 ^ side]);
-            let (origin, reciprocal) = (self.origin[axis], reciprocals[axis]);
+            let (origin, reciprocal) = (origins[axis], reciprocals[axis]);
             times[axis] = if ROBUST {
                 plane.sub(origin).mul(reciprocal)
             } else {

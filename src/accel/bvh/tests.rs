@@ -155,12 +155,11 @@ fn rays_along_the_axes_hit() {
         mesh
     };
     let world = world(flat);
-    {
-        let precision = Precision::Robust;
+    for precision in Precision::ALL {
         let options = BuildOptions { precision, ..BuildOptions::default() };
         let accel = BvhAccel::build(&world, &options, &|_| true).unwrap();
-        for i in 1..2 * n {
-            for j in 1..2 * n {
+        for i in 0..=2 * n {
+            for j in 0..=2 * n {
                 let [x, z] = [i, j].map(|i| i as f32 / n as f32 - 1.0);
                 for direction in [Vec3::NEG_Y, Vec3::new(-0.0, -1.0, -0.0)] {
                     let hit = accel.intersect(&Ray::new(Vec3::new(x, 2.0, z), direction));
