@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 
-use super::units::{parse_bytes, parse_crop, parse_size};
+use super::units::{parse_bytes, parse_count, parse_crop, parse_size};
 use crate::accel::{AccelKind, BuildQuality, Precision};
 use crate::film::{Filter, PixelRect};
+use crate::geometry::generate::GeneratedKind;
 use crate::io::{ExrCompression, PixelType};
 use crate::scene::IntegratorKind;
 
@@ -24,6 +25,7 @@ Start here:
   alhazen render scene.toml --size 640x360 --samples 4 --set camera.fov=30
   alhazen inspect scene.toml                  what it holds, what it requires, what it costs
   alhazen compare out.exr reference.exr       how far a picture is from a reference
+  alhazen generate terrain --triangles 10M -o terrain.ply
 
 Exit codes: 0 done, 1 the render failed or a comparison exceeded a limit, 2 bad input or usage, 130 interrupted
 (once rendering had begun, a valid picture is on disk).
@@ -42,6 +44,8 @@ pub(super) enum Command {
     Inspect(InspectArgs),
     /// Say how far a picture is from a reference (EXR or PNG): MSE, relMSE, PSNR, FLIP
     Compare(CompareArgs),
+    /// Write a test mesh of any size, the same for the same seed
+    Generate(GenerateArgs),
 }
 
 /// What chooses and changes a scene.
@@ -197,6 +201,44 @@ pub(super) struct CompareArgs {
     pub(super) json: Option<PathBuf>,
 
     /// No table: only errors and exceeded limits
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Kinds:
+  terrain   fractal hills, 100 by 100 m, open at the edges
+  sphere    a ball with a displaced surface, closed, of radius 1 m
+  blobs     a displaced closed shell of radius 10 m with 100 displaced closed blobs in it
+  slivers   triangles of their own, 1 to 6 m long and 4 mm wide, in a cube of 100 m
+  soup      triangles of their own in a cube of 2 m; the more there are, the smaller
+
+The mesh is written in pieces as it is made: any number of triangles takes a few MB of memory.")]
+pub(super) struct GenerateArgs {
+    /// What to generate
+    #[arg(value_name = "KIND", hide_possible_values = true,
+          value_parser = by_name(&GeneratedKind::ALL, GeneratedKind::name))]
+    pub(super) kind: GeneratedKind,
+
+    /// File to write, .ply or .stl (binary, little-endian)
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
+
+    /// Number of triangles, as in 500k or 10M; where the surface is a grid, as many as fit into a whole
+    /// one: a little fewer
+    #[arg(long, short = 'n', value_name = "N", default_value = "1M", value_parser = parse_count)]
+    pub(super) triangles: u64,
+
+    /// Same kind, number and seed: same file
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) seed: u32,
+
+    /// Threads; all of the machine's where not given
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    pub(super) threads: Option<u16>,
+
+    /// No progress and no closing line: only errors
     #[arg(long, short)]
     pub(super) quiet: bool,
 }

@@ -17,7 +17,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
     let read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
     let clock = Instant::now();
-    let scene = job::thread_pool(args)?.install(|| job::build(args, loaded))?;
+    let scene = job::thread_pool(args.threads)?.install(|| job::build(args, loaded))?;
     let build = clock.elapsed().as_secs_f64();
 
     let info = scene.accel.info();

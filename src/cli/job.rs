@@ -50,7 +50,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     catch_interrupts();
     let mut phases = Phases::default();
     let clock = Instant::now();
-    let pool = thread_pool(&args.scene)?;
+    let pool = thread_pool(args.scene.threads)?;
     let loaded = pool.install(|| load(&args.scene))?;
     phases.read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
@@ -214,9 +214,9 @@ pub(super) fn build(args: &SceneArgs, loaded: LoadedScene) -> Result<Scene, Fail
 }
 
 /// The threads that everything runs on.
-pub(super) fn thread_pool(args: &SceneArgs) -> Result<rayon::ThreadPool, Failure> {
+pub(super) fn thread_pool(threads: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
     rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.map_or(0, usize::from))
+        .num_threads(threads.map_or(0, usize::from))
         .build()
         .map_err(|e| Failure::Failed(format!("cannot start threads: {e}")))
 }

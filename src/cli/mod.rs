@@ -6,6 +6,7 @@
 
 mod args;
 mod compare;
+mod generate;
 mod inspect;
 mod job;
 mod progress;
@@ -77,6 +78,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Command::Render(args) => job::render(&args, start),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Compare(args) => compare::compare(&args),
+        Command::Generate(args) => generate::generate(&args),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -5,6 +5,7 @@
 //! them. Nothing here knows what is hit or how it looks.
 
 mod bounds;
+pub(crate) mod noise;
 mod quartic;
 mod ray;
 mod rounding;

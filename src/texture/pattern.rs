@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::noise::{fbm, turbulence};
+use crate::math::noise::{fbm, turbulence};
 use super::place::{Placement, Region};
 use super::ramp::Ramp;
 use super::{BumpGradient, TexturePoint};

@@ -6,11 +6,11 @@
 use glam::DVec3;
 
 /// Most octaves; the finest is then 65,536 times finer than the coarsest.
-pub(super) const MAX_OCTAVES: u32 = 16;
+pub(crate) const MAX_OCTAVES: u32 = 16;
 
 /// Gradient noise: smooth, about one hill or hollow a unit cube, from −1 to 1 (by at most 4 %
 /// beyond), 0 at the corners of the cubes. Different seeds are different noises.
-pub(super) fn noise(p: DVec3, seed: u32) -> f64 {
+pub(crate) fn noise(p: DVec3, seed: u32) -> f64 {
     let cell = p.floor();
     let t = p - cell;
     let [x, y, z] = cell.to_array().map(|c| c as i64);
@@ -73,7 +73,7 @@ fn octave(p: DVec3, i: u32) -> DVec3 {
 ///
 /// The sum is scaled so that its spread is that of a single octave, and cut off at ±1, which few
 /// places reach.
-pub(super) fn fbm(p: DVec3, width: f64, octaves: u32, gain: f64, seed: u32) -> f64 {
+pub(crate) fn fbm(p: DVec3, width: f64, octaves: u32, gain: f64, seed: u32) -> f64 {
     let mut sum = 0.0;
     let mut energy = 0.0;
     let mut strength = 1.0;
@@ -95,7 +95,7 @@ const MEAN_ABS: f64 = 0.22;
 /// is finer than the footprint is replaced by its mean.
 ///
 /// Source: Perlin, *An Image Synthesizer*, SIGGRAPH 1985.
-pub(super) fn turbulence(p: DVec3, width: f64, octaves: u32, seed: u32) -> f64 {
+pub(crate) fn turbulence(p: DVec3, width: f64, octaves: u32, seed: u32) -> f64 {
     let octaves = 0..octaves.clamp(1, MAX_OCTAVES);
     let octaves = octaves.map(|i| {
         let left = left(width * f64::from(1_u32 << i));
