@@ -650,6 +650,7 @@ fn the_reference_has_the_defaults() {
         (" `[render]`", "filter", choice(settings.filter.name())),
         (" `[render]`", "precision", choice(settings.precision.name())),
         (" `[render]`", "build_quality", choice(settings.build_quality.name())),
+        (" `[render]`", "compact", choice("auto")),
         (" `[render]`", "tolerance", "0.5".into()),
         (" `[render]`", "epsilon", choice("auto")),
     ] {

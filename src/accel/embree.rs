@@ -10,7 +10,9 @@ use glam::DVec3;
 
 use super::block::{HitBlock, LANES, RayBlock, lanes_of};
 use super::world::{CopyRef, Geometry, Group, InstanceSet, World};
-use super::{AccelError, AccelInfo, BuildOptions, BuildQuality, Hit, Precision, RayQuery};
+use super::{
+    ARRAY_FROM, AccelError, AccelInfo, BuildOptions, BuildQuality, Hit, Precision, RayQuery,
+};
 use crate::embree::{
     self, BuildProgress, Device, DeviceConfig, EmbreeError, ErrorCode, INVALID_ID, PacketMask,
     Quality, RayHitPacket, RayPacket, Scene, SceneBuilder, SceneFlags, UserBounds, UserGeometry,
@@ -18,10 +20,6 @@ use crate::embree::{
 };
 use crate::geometry::{AnalyticShape, with_shapes};
 use crate::math::Ray;
-
-/// Sets with more copies than this become instance arrays: 90 bytes a copy instead of 330, for
-/// rays that are up to a seventh slower.
-const ARRAY_FROM: usize = 1 << 16;
 
 /// Masks of geometries, and of the rays that see them: a copy has Embree's default, that of what is
 /// opaque, so such rays enter it.
@@ -90,6 +88,7 @@ impl EmbreeAccel {
             Precision::Fast => SceneFlags::NONE,
             Precision::Robust => SceneFlags::ROBUST,
         };
+        let flags = if options.compact { flags | SceneFlags::COMPACT } else { flags };
         // Every group counts by its primitives towards the progress.
         let size = |group: &Group| group.geometries.iter().map(Geometry::len).sum::<usize>().max(1);
         let sizes = world.prototypes.iter().chain([&world.root]).map(size);

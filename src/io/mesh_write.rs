@@ -35,7 +35,8 @@ pub fn write_mesh(
     let (vertices, triangles) = (mesh.vertex_count(), mesh.triangle_count());
     write_whole(path, |file| {
         let failed = |e| WriteError::io(path, "write", e);
-        let mut out = Chunks { path, progress, total: if is_ply { vertices } else { 0 } + triangles };
+        let mut out =
+            Chunks { path, progress, total: if is_ply { vertices } else { 0 } + triangles };
         let title = format!("alhazen generate {} --seed {}", mesh.kind().name(), mesh.seed());
         if is_ply {
             file.write_all(ply_header(&title, vertices, triangles).as_bytes()).map_err(failed)?;

@@ -7,6 +7,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::error::ReadError;
+use super::memory::check_memory;
 
 /// Bytes that one task reads at a time.
 pub(super) const CHUNK: usize = 4 << 20;
@@ -58,6 +59,7 @@ impl<'a> Source<'a> {
     pub fn read_from(&self, offset: u64) -> Result<Vec<u8>, ReadError> {
         let n = usize::try_from(self.len.saturating_sub(offset))
             .map_err(|_| ReadError::file(self.path, "the file does not fit into memory"))?;
+        check_memory(self.path, n as u64)?;
         let mut bytes = vec![0; n];
         bytes
             .par_chunks_mut(CHUNK)

@@ -179,8 +179,7 @@ impl Balls {
     }
 
     pub(super) fn vertex(&self, i: u64) -> DVec3 {
-        let (lattice, ball, i) =
-            self.find(i, self.outer.vertex_count(), self.inner.vertex_count());
+        let (lattice, ball, i) = self.find(i, self.outer.vertex_count(), self.inner.vertex_count());
         let Ball { center, radius, noise } = &self.balls[ball as usize];
         // Down to hills four cells wide; about two of the widest across a face.
         let octaves = (lattice.n / 8).max(1).ilog2() + 1;
