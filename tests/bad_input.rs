@@ -64,7 +64,11 @@ fn files_that_lie_are_told_and_take_no_memory() {
         ("many.stl", stl(4_000_000_000), "4000000000 triangles need 200000000084 bytes"),
         ("index.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 4000000000\n".to_vec(), "index.obj:3"),
         ("word.obj", b"v 0 0 zero\n".to_vec(), "word.obj:1"),
-        ("facet.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\n".to_vec(), "facet.stl"),
+        (
+            "facet.stl",
+            b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\n".to_vec(),
+            "facet.stl",
+        ),
     ];
     for (name, bytes, expected) in cases {
         std::fs::write(folder.path().join(name), bytes).unwrap();
@@ -127,7 +131,8 @@ fn triangles_that_are_not_finite_are_dropped_or_refused() {
         ("refuse.toml", Some("drop"), 2, refused),
         ("both.toml", None, 2, refused),
     ] {
-        let mut arguments = vec!["render", scene, "--size", "8x8", "--accel", "brute", "-o", "x.png"];
+        let mut arguments =
+            vec!["render", scene, "--size", "8x8", "--accel", "brute", "-o", "x.png"];
         arguments.extend(flag.into_iter().flat_map(|flag| ["--non-finite", flag]));
         let output = alhazen(folder.path(), &arguments);
         let said = stderr(&output);

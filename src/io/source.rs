@@ -82,6 +82,18 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_shrinks_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ply");
+        std::fs::write(&path, [0; 100]).unwrap();
+        let source = Source::open(&path).unwrap();
+        File::options().write(true).open(&path).unwrap().set_len(50).unwrap();
+        let text = source.read_from(0).unwrap_err().to_string();
+        assert!(text.contains("a.ply: cannot read"), "{text}");
+        assert!(source.read_at(&mut [0; 50], 0).is_ok());
+    }
+
+    #[test]
     fn reads_in_parts() {
         let path = std::env::temp_dir().join(format!("alhazen-{}-parts", std::process::id()));
         let bytes: Vec<u8> = (0..2 * CHUNK + 5).map(|i| (i % 251) as u8).collect();
