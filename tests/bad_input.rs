@@ -1,5 +1,5 @@
 //! Meshes that lie: one clear error, exit code 2, and no memory for what a file merely claims.
-#![allow(missing_docs, reason = "a test program")]
+#![allow(missing_docs, clippy::print_stderr, reason = "a test program")]
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -97,7 +97,7 @@ fn no_permission_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ply");
     std::fs::write(&path, "ply\n").unwrap();
-    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0)).unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o0)).unwrap();
     if std::fs::File::open(&path).is_ok() {
         eprintln!("not run: root may read everything");
         return;
