@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 mod common;
-use common::{alhazen, stderr, stdout};
+use common::{alhazen, stderr};
 
 const VERTEX: &str = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
 const FACE: &str = "property list uint uint vertex_indices\nend_header\n";
@@ -148,7 +148,7 @@ fn compact_where_it_must_be_or_is_asked_for() {
     let run = |arguments: &[&str]| {
         let output = alhazen(folder.path(), arguments);
         assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
-        (stdout(&output), stderr(&output))
+        (common::stdout(&output), stderr(&output))
     };
     run(&["generate", "sphere", "-n", "200k", "-o", "s.ply", "-q"]);
     // 200,000 triangles take 20 MB, or 14 MB compact.
