@@ -4,7 +4,7 @@
 CARGO ?= cargo
 SETUP := ./scripts/setup.sh
 
-.PHONY: help setup build demo test verify bench lint doc clean
+.PHONY: help setup build demo test verify bench fuzz lint doc clean
 
 help: ## Lists these targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 14
@@ -29,6 +29,10 @@ verify: test ## Runs what takes longer: many more random rays and scenes, others
 
 bench: setup ## Measures ray queries, the variants, every option, and other renderers
 	$(CARGO) bench --locked
+
+fuzz: ## Feeds every parser with broken input, SECONDS (600) each; ends at the first finding
+	@$(SETUP) fuzz
+	./scripts/fuzz.sh $(or $(SECONDS),600)
 
 lint: setup ## Formatting, clippy and documentation without warnings
 	$(CARGO) fmt --check

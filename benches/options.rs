@@ -342,7 +342,7 @@ fn load(folder: &Path, row: &Row, sets: &[&Vec<String>]) -> Result<Scene, String
     let more = if sets.len() > 1 { row.more } else { "" };
     std::fs::write(&path, format!("{STILL_LIFE}{}{more}", balls())).map_err(|e| e.to_string())?;
     let set = sets.iter().flat_map(|sets| sets.iter().cloned()).collect();
-    let options = LoadOptions { set, camera: None };
+    let options = LoadOptions { set, ..LoadOptions::default() };
     let loaded = load_scene(&path, &options).map_err(|error| error.to_string())?;
     Scene::build_quietly(loaded.scene, AccelKind::default())
         .map_err(|errors| errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))

@@ -5,6 +5,7 @@
 #   scripts/setup.sh build   C compiler, libclang (for bindgen), Embree 4
 #   scripts/setup.sh test    the same, the EXR tools that the tests read our files with, and POV-Ray,
 #                            with whose pictures they compare ours
+#   scripts/setup.sh fuzz    C++ compiler, for libFuzzer (the fuzz targets need neither libclang nor Embree)
 #
 # Embree comes from, in this order: EMBREE_DIR, the project's own prefix (.embree), the system.
 # Where the distribution's Embree is older than 4 (Debian 12), Debian 13's is unpacked into the
@@ -90,7 +91,13 @@ unpack_embree() {
     mv "$work" "$prefix"
 }
 
-case $stage in build|test) ;; *) die "unknown stage '$stage'; one of: build, test" ;; esac
+case $stage in build|test|fuzz) ;; *) die "unknown stage '$stage'; one of: build, test, fuzz" ;; esac
+
+# --- fuzz ----------------------------------------------------------------------------------------
+if [ "$stage" = fuzz ]; then
+    command -v c++ >/dev/null 2>&1 || install_packages g++
+    exit 0
+fi
 
 # --- build ---------------------------------------------------------------------------------------
 missing=

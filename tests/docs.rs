@@ -219,12 +219,12 @@ fn every_set_on_a_command_line_fits_the_first_scene() {
         let values = words.windows(2).filter(|pair| pair[0] == "--set");
         let set: Vec<String> = values.map(|pair| pair[1].clone()).collect();
         count += set.len();
-        let options = LoadOptions { set, camera: None };
+        let options = LoadOptions { set, ..LoadOptions::default() };
         try_file(folder.path(), &words[2], &options).unwrap_or_else(|e| panic!("{line}: {e}"));
     }
     assert!(count >= 5, "only {count} were found");
 
-    let options = LoadOptions { set: vec!["camera.fvo=30".into()], camera: None };
+    let options = LoadOptions { set: vec!["camera.fvo=30".into()], ..LoadOptions::default() };
     let error = try_file(folder.path(), "scene.toml", &options).unwrap_err();
     assert!(section(" Mistakes").contains(&format!("\n{error}\n")), "not documented: {error}");
 }
@@ -650,6 +650,7 @@ fn the_reference_has_the_defaults() {
         (" `[render]`", "filter", choice(settings.filter.name())),
         (" `[render]`", "precision", choice(settings.precision.name())),
         (" `[render]`", "build_quality", choice(settings.build_quality.name())),
+        (" `[render]`", "compact", choice("auto")),
         (" `[render]`", "tolerance", "0.5".into()),
         (" `[render]`", "epsilon", choice("auto")),
     ] {

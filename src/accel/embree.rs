@@ -37,6 +37,8 @@ pub struct EmbreeAccel {
     /// Which instance set each id above those of the root's geometries stands for.
     sets: Vec<u32>,
     first_set: u32,
+    /// Bytes of what the copies refer to, which Embree does not count.
+    copies_bytes: u64,
 }
 
 impl EmbreeAccel {
@@ -85,6 +87,7 @@ impl EmbreeAccel {
             Precision::Fast => SceneFlags::NONE,
             Precision::Robust => SceneFlags::ROBUST,
         };
+        let flags = if options.compact { flags | SceneFlags::COMPACT } else { flags };
         // Every group counts by its primitives towards the progress.
         let size = |group: &Group| group.geometries.iter().map(Geometry::len).sum::<usize>().max(1);
         let sizes = world.prototypes.iter().chain([&world.root]).map(size);
@@ -108,6 +111,7 @@ impl EmbreeAccel {
         let reaches: Vec<_> = world.prototypes.iter().map(Reach::of).collect();
         let first_set = world.root.geometries.len() as u32;
         let mut sets = Vec::with_capacity(world.sets.len());
+        let mut copies_bytes = 0;
         for (index, set) in (0u32..).zip(&world.sets) {
             let prototype = set.prototype as usize;
             // Copies of nothing are nothing.
@@ -119,9 +123,11 @@ impl EmbreeAccel {
                 "Embree numbers geometries in order"
             );
             sets.push(index);
+            let each = size_of::<Transform3x4>() + size_of::<UserBounds>();
+            copies_bytes += (set.transforms.len() * each) as u64;
         }
         let scene = commit(builder, size(&world.root))?;
-        Ok(Self { scene, packet_width: device.packet_width(), sets, first_set })
+        Ok(Self { scene, packet_width: device.packet_width(), sets, first_set, copies_bytes })
     }
 
     /// Name, version, instruction set and memory, for reports and file headers.
@@ -131,7 +137,7 @@ impl EmbreeAccel {
             name: format!("Embree {}", device.version()),
             isa: device.isa().name(),
             packet_width: self.packet_width,
-            bytes: device.memory().current,
+            bytes: device.memory().current + self.copies_bytes,
         }
     }
 

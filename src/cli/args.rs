@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 
-use super::units::{parse_bytes, parse_crop, parse_size};
+use super::units::{parse_bytes, parse_count, parse_crop, parse_size};
 use crate::accel::{AccelKind, BuildQuality, Precision};
 use crate::film::{Filter, PixelRect};
-use crate::io::{ExrCompression, PixelType};
+use crate::geometry::generate::GeneratedKind;
+use crate::io::{ExrCompression, NonFinite, PixelType};
 use crate::measure::bench::StructureKind;
 use crate::scene::IntegratorKind;
 
@@ -26,6 +27,7 @@ Start here:
   alhazen inspect scene.toml                  what it holds, what it requires, what it costs
   alhazen compare out.exr reference.exr       how far a picture is from a reference
   alhazen bench bunny.ply --html bench.html   how fast and how right accelerators are on it
+  alhazen generate terrain --triangles 10M -o terrain.ply
 
 Exit codes: 0 done, 1 the render failed or a comparison exceeded a limit, 2 bad input or usage, 130 interrupted
 (once rendering had begun, a valid picture is on disk).
@@ -46,6 +48,8 @@ pub(super) enum Command {
     Compare(CompareArgs),
     /// Measure accelerators on the rays of a scene: build time, memory, speed, agreement
     Bench(BenchArgs),
+    /// Write a test mesh of any size, the same for the same seed
+    Generate(GenerateArgs),
 }
 
 /// What chooses and changes a scene.
@@ -96,7 +100,19 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
     pub(super) threads: Option<u16>,
 
-    /// Most memory that the hierarchy may take, as in 8G or 512M; more is an error, not swapping
+    /// Half the memory for the hierarchy, for rays that are 1.4 to 1.8 times slower; taken anyway where it
+    /// would not fit otherwise
+    #[arg(long)]
+    pub(super) compact: bool,
+
+    /// What becomes of triangles with NaN or infinite coordinates, where an object does not say: `drop`
+    /// leaves them out with a warning, `refuse` is an error
+    #[arg(long, value_name = "NAME", default_value = NonFinite::ALL[0].name(),
+          value_parser = by_name(&NonFinite::ALL, NonFinite::name))]
+    pub(super) non_finite: NonFinite,
+
+    /// Most memory that the hierarchy may take, as in 8G or 512M; more is an error before it is built.
+    /// Without it: what the machine has free
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     pub(super) memory_limit: Option<u64>,
 
@@ -265,6 +281,44 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
     let text = text.trim().trim_end_matches('s');
     let seconds = text.parse().ok().filter(|x: &f64| *x > 0.0 && *x <= 86_400.0);
     seconds.ok_or_else(|| "expected a number of seconds, more than 0, at most 86400".to_owned())
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Kinds:
+  terrain   fractal hills, 100 by 100 m, open at the edges
+  sphere    a ball with a displaced surface, closed, of radius 1 m
+  blobs     a displaced closed shell of radius 10 m with 100 displaced closed blobs in it
+  slivers   triangles of their own, 1 to 6 m long and 4 mm wide, in a cube of 100 m
+  soup      triangles of their own in a cube of 2 m; the more there are, the smaller
+
+The mesh is written in pieces as it is made: any number of triangles takes a few MB of memory.")]
+pub(super) struct GenerateArgs {
+    /// What to generate
+    #[arg(value_name = "KIND", hide_possible_values = true,
+          value_parser = by_name(&GeneratedKind::ALL, GeneratedKind::name))]
+    pub(super) kind: GeneratedKind,
+
+    /// File to write, .ply or .stl (binary, little-endian)
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
+
+    /// Number of triangles, as in 500k or 10M; where the surface is a grid, as many as fit into a whole
+    /// one: a little fewer
+    #[arg(long, short = 'n', value_name = "N", default_value = "1M", value_parser = parse_count)]
+    pub(super) triangles: u64,
+
+    /// Same kind, number and seed: same file
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) seed: u32,
+
+    /// Threads; all of the machine's where not given
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    pub(super) threads: Option<u16>,
+
+    /// No progress and no closing line: only errors
+    #[arg(long, short)]
+    pub(super) quiet: bool,
 }
 
 /// A limit of a metric.

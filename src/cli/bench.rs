@@ -28,11 +28,11 @@ pub(super) fn bench(args: &BenchArgs) -> Result<Outcome, Failure> {
     let scene_args = &args.scene;
     job::check_targets(&scene_args.scene, args.json.iter().chain(&args.html))?;
     catch_interrupts();
-    let pool = job::thread_pool(scene_args)?;
+    let pool = job::thread_pool(scene_args.threads)?;
     let loaded = pool.install(|| job::load(scene_args))?;
     // Nothing is built for the scene itself: Embree keeps the threads of the first build, which is to be
     // one with a single thread.
-    let scene = pool.install(|| job::build(scene_args, AccelKind::Brute, loaded))?;
+    let scene = pool.install(|| job::build(scene_args, AccelKind::Brute, loaded, 0))?;
     let options = BenchOptions {
         structures: if args.accel.is_empty() { StructureKind::all() } else { args.accel.clone() },
         threads: pool.current_num_threads(),

@@ -6,6 +6,7 @@ use super::args::InspectArgs;
 use super::report::peak_bytes;
 use super::units::{grouped, megabytes};
 use super::{Failure, Outcome, job, print};
+use crate::film::PixelRect;
 use crate::scene::{IntegratorKind, Scene};
 
 /// Loads and builds the scene, and prints what it finds.
@@ -18,7 +19,9 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
     let read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
     let clock = Instant::now();
-    let scene = job::thread_pool(args)?.install(|| job::build(args, kind, loaded))?;
+    let film = job::film_bytes(&PixelRect::whole(loaded.scene.image.size));
+    let pool = job::thread_pool(args.threads)?;
+    let scene = pool.install(|| job::build(args, kind, loaded, film))?;
     let build = clock.elapsed().as_secs_f64();
 
     let info = scene.accel.info();
@@ -31,6 +34,16 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
                 "{} in {info}, {} at most in all",
                 megabytes(info.bytes),
                 megabytes(peak_bytes())
+            ),
+        ),
+        (
+            "estimate",
+            format!(
+                "{} while it is built, {} after{}; picture {}",
+                megabytes(scene.memory_estimate.peak),
+                megabytes(scene.memory_estimate.kept),
+                if scene.is_compact { ", compact" } else { "" },
+                megabytes(film)
             ),
         ),
     ];

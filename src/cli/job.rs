@@ -9,11 +9,11 @@ use serde::Serialize;
 use super::args::{RenderArgs, SceneArgs};
 use super::progress::{Progress, catch_interrupts, interrupted};
 use super::{Failure, Outcome, print, report, tell};
-use crate::accel::{AccelError, AccelKind, BuildOptions};
+use crate::accel::{AccelError, AccelKind, BuildOptions, Compact};
 use crate::film::PixelRect;
 use crate::io::{
-    ExrOptions, LoadOptions, LoadedScene, PixelType, WriteError, check_writable, load_scene,
-    write_exr, write_png,
+    ExrOptions, LoadOptions, LoadedScene, PixelType, WriteError, available_memory, check_writable,
+    load_scene, write_exr, write_png,
 };
 use crate::render::{RenderJob, Rendered, render as run_render};
 use crate::scene::{Scene, SceneError};
@@ -50,16 +50,17 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     catch_interrupts();
     let mut phases = Phases::default();
     let clock = Instant::now();
-    let pool = thread_pool(&args.scene)?;
+    let pool = thread_pool(args.scene.threads)?;
     let loaded = pool.install(|| load(&args.scene))?;
     phases.read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
     let size = loaded.scene.image.size;
     let crop = args.crop.map(|crop| check_crop(crop, size)).transpose()?;
-    check_memory(&crop.unwrap_or(PixelRect::whole(size)))?;
+    let film = film_bytes(&crop.unwrap_or(PixelRect::whole(size)));
+    check_memory(size, film)?;
 
     let clock = Instant::now();
-    let scene = pool.install(|| build(&args.scene, args.accel.kind, loaded))?;
+    let scene = pool.install(|| build(&args.scene, args.accel.kind, loaded, film))?;
     phases.build = clock.elapsed().as_secs_f64();
 
     let job = RenderJob { crop, seed: args.seed, variant: None };
@@ -115,7 +116,11 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
 
 /// Loads the scene and applies the flags that stand for its fields. Warnings are printed.
 pub(super) fn load(args: &SceneArgs) -> Result<LoadedScene, Failure> {
-    let options = LoadOptions { set: args.set.clone(), camera: args.camera.clone() };
+    let options = LoadOptions {
+        set: args.set.clone(),
+        camera: args.camera.clone(),
+        non_finite: args.non_finite,
+    };
     let mut loaded =
         load_scene(&args.scene, &options).map_err(|e| Failure::BadInput(e.to_string()))?;
     if !args.quiet {
@@ -130,6 +135,9 @@ pub(super) fn load(args: &SceneArgs) -> Result<LoadedScene, Failure> {
     settings.precision = args.precision.unwrap_or(settings.precision);
     settings.build_quality = args.build_quality.unwrap_or(settings.build_quality);
     settings.filter = args.filter.unwrap_or(settings.filter);
+    if args.compact {
+        settings.compact = Compact::On;
+    }
     // Flags and fields that say the same are the same scene.
     let said = format!("{:016x} {:?} {:?}", loaded.hash, scene.image, scene.settings);
     loaded.hash = xxhash_rust::xxh3::xxh3_64(said.as_bytes());
@@ -160,36 +168,36 @@ pub(super) fn check_targets<'a>(
     Ok(())
 }
 
+/// Bytes that a picture takes: mean and error of a pixel, and what the encoders need beside them.
+pub(super) fn film_bytes(window: &PixelRect) -> u64 {
+    window.area() as u64 * 40
+}
+
 /// Refuses a picture that does not fit into memory, before the machine starts to swap.
-fn check_memory(window: &PixelRect) -> Result<(), Failure> {
-    // Mean and error of a pixel, and what the encoders need beside them.
-    let needed = window.area() as u64 * 40;
-    let status = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
-    let free = line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<u64>().ok());
-    match free.map(|kilobytes| kilobytes * 1024) {
-        Some(free) if needed > free => Err(Failure::BadInput(format!(
-            "a picture of {} x {} pixels needs {:.0} GB, and {:.0} GB of memory are free; \
+fn check_memory([width, height]: [u32; 2], film: u64) -> Result<(), Failure> {
+    match available_memory() {
+        Some(free) if film > free => Err(Failure::BadInput(format!(
+            "a picture of {width} x {height} pixels needs {:.0} GB, and {:.0} GB of memory are free; \
              accepted: a smaller --size, or a part of it by --crop",
-            window.width(),
-            window.height(),
-            needed as f64 / 1e9,
+            film as f64 / 1e9,
             free as f64 / 1e9
         ))),
         _ => Ok(()),
     }
 }
 
-/// Builds the scene, showing progress.
+/// Builds the scene, showing progress; leaves `film` bytes free for the picture.
 pub(super) fn build(
     args: &SceneArgs,
     kind: AccelKind,
     loaded: LoadedScene,
+    film: u64,
 ) -> Result<Scene, Failure> {
     let options = BuildOptions {
         kind,
         threads: args.threads.map(usize::from),
         memory_limit: args.memory_limit,
+        free: available_memory().map(|free| free.saturating_sub(film)),
         ..BuildOptions::default()
     };
     if interrupted() {
@@ -202,8 +210,18 @@ pub(super) fn build(
     };
     let scene = Scene::build(loaded.scene, &options, &go_on);
     progress.finish();
+    if let Ok(scene) = &scene
+        && scene.is_compact
+        && scene.settings.compact == Compact::Auto
+        && !args.quiet
+    {
+        tell("the hierarchy is compact, as memory does not suffice otherwise: rays take longer");
+    }
     scene.map_err(|errors| match errors.as_slice() {
         [SceneError::Accel(AccelError::Interrupted)] => Failure::Interrupted,
+        [SceneError::Accel(error @ AccelError::NoRoom { .. })] => {
+            Failure::BadInput(error.to_string())
+        }
         [SceneError::Accel(error)] => Failure::Failed(error.to_string()),
         errors => {
             const SHOWN: usize = 50;
@@ -218,9 +236,9 @@ pub(super) fn build(
 }
 
 /// The threads that everything runs on.
-pub(super) fn thread_pool(args: &SceneArgs) -> Result<rayon::ThreadPool, Failure> {
+pub(super) fn thread_pool(threads: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
     rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.map_or(0, usize::from))
+        .num_threads(threads.map_or(0, usize::from))
         .build()
         .map_err(|e| Failure::Failed(format!("cannot start threads: {e}")))
 }

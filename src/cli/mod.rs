@@ -7,6 +7,7 @@
 mod args;
 mod bench;
 mod compare;
+mod generate;
 mod inspect;
 mod job;
 mod progress;
@@ -79,6 +80,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Bench(args) => bench::bench(&args),
+        Command::Generate(args) => generate::generate(&args),
     };
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

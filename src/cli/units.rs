@@ -40,6 +40,25 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
     }
 }
 
+/// "500k", "10M", "1.5G": powers of 1000.
+pub(super) fn parse_count(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let factor = match unit.trim() {
+        "" => 1.0,
+        "k" | "K" => 1e3,
+        "M" | "m" => 1e6,
+        "G" | "g" => 1e9,
+        _ => return Err("expected a number such as 500k or 10M".to_owned()),
+    };
+    match number.parse::<f64>() {
+        // Up to 2⁵³ every whole number is an f64.
+        Ok(n) if (0.0..=9e15).contains(&(n * factor)) => Ok((n * factor).round() as u64),
+        _ => Err("expected a number such as 500k or 10M".to_owned()),
+    }
+}
+
 /// 1,234,567.
 pub(super) fn grouped(n: u64) -> String {
     let digits = n.to_string();
@@ -85,6 +104,17 @@ mod tests {
         assert_eq!(parse_bytes("100"), Ok(100));
         for bad in ["", "G", "0", "-1G", "1X"] {
             assert!(parse_bytes(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn counts() {
+        assert_eq!(parse_count("10M"), Ok(10_000_000));
+        assert_eq!(parse_count("500 k"), Ok(500_000));
+        assert_eq!(parse_count("1.1k"), Ok(1100));
+        assert_eq!(parse_count("12345678"), Ok(12_345_678));
+        for bad in ["", "M", "-1", "1e400", "10Mi", "1.2.3"] {
+            assert!(parse_count(bad).is_err(), "{bad}");
         }
     }
 

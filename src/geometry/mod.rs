@@ -6,6 +6,7 @@ mod cuboid;
 mod disk;
 mod framed;
 pub mod freeform;
+pub mod generate;
 pub mod grid;
 mod implicit;
 mod isosurface;

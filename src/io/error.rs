@@ -88,6 +88,9 @@ pub enum WriteError {
         /// Why not.
         message: String,
     },
+    /// Whoever asked for the file does not want it any more.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 impl WriteError {

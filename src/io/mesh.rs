@@ -22,6 +22,31 @@ pub struct MeshFile {
     pub mesh: TriangleMesh,
     /// What was dropped, repaired or not understood: one sentence each, without the file's name.
     pub warnings: Vec<String>,
+    /// Which triangles were dropped for a coordinate that is not finite: the beginning of a sentence.
+    pub non_finite: Option<String>,
+}
+
+/// What becomes of triangles with a coordinate that is NaN, infinite or beyond use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum NonFinite {
+    /// They are left out, with a warning.
+    #[default]
+    Drop,
+    /// The mesh is refused.
+    Refuse,
+}
+
+impl NonFinite {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Drop, Self::Refuse];
+
+    /// The name in scene files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Drop => "drop",
+            Self::Refuse => "refuse",
+        }
+    }
 }
 
 /// Reads a mesh from a `.ply`, `.obj` or `.stl` file, told apart by the extension in either case.
@@ -224,7 +249,7 @@ impl Draft {
                 was(*count),
             ));
         }
-        self.drop_unusable_positions();
+        let non_finite = self.drop_unusable_positions();
         if let Some(normals) = &mut self.normals {
             zero_unless_finite(normals);
         }
@@ -249,14 +274,14 @@ impl Draft {
             normals: self.normals.map(Arc::new),
             uvs: self.uvs.map(Arc::new),
         };
-        MeshFile { mesh, warnings: self.warnings }
+        MeshFile { mesh, warnings: self.warnings, non_finite }
     }
 
     /// Moves vertices with an unusable coordinate to the origin and drops their triangles.
-    fn drop_unusable_positions(&mut self) {
+    fn drop_unusable_positions(&mut self) -> Option<String> {
         let usable = |v: &f32| v.abs() <= MAX_COORDINATE as f32;
         if self.xyz.par_chunks(1 << 16).all(|part| part.iter().all(usable)) {
-            return;
+            return None;
         }
         // Mark them first: their coordinates are about to be zero.
         let mut is_bad = vec![false; self.xyz.len() / 3];
@@ -267,7 +292,7 @@ impl Draft {
             }
         }
         let touches = |t: &[u32; 3]| t.iter().any(|&v| is_bad[v as usize]);
-        let Some(first) = self.triangles.iter().position(touches) else { return };
+        let first = self.triangles.iter().position(touches)?;
         let before = self.triangles.len();
         self.triangles.retain(|t| !touches(t));
         let dropped = (before - self.triangles.len()) as u64;
@@ -276,6 +301,11 @@ impl Draft {
             counted(dropped, "triangle"),
             was(dropped),
         ));
+        let has = if dropped == 1 { "has" } else { "have" };
+        let triangles = counted(dropped, "triangle");
+        Some(format!(
+            "{triangles} {has} a NaN or infinite coordinate; the first is triangle {first}"
+        ))
     }
 }
 
@@ -356,7 +386,11 @@ mod tests {
             uvs: Some(vec![[f32::INFINITY, 0.0]; 5]),
             ..Draft::default()
         };
-        let MeshFile { mesh, warnings } = draft.finish();
+        let MeshFile { mesh, warnings, non_finite } = draft.finish();
+        assert_eq!(
+            non_finite.as_deref(),
+            Some("2 triangles have a NaN or infinite coordinate; the first is triangle 1")
+        );
         assert_eq!(*mesh.triangles, [[0, 2, 2], [0, 0, 2]]);
         assert!(mesh.positions.as_flat().iter().all(|v| v.is_finite()));
         assert_eq!(

@@ -16,6 +16,7 @@ use glam::DVec3;
 use self::header::{Element, Format, Header};
 use self::values::{Ascii, Binary, Values};
 use super::error::ReadError;
+use super::memory::check_memory;
 use super::mesh::{Draft, MeshFile, check_count, place};
 use super::polygon::Cutter;
 use super::source::Source;
@@ -85,6 +86,7 @@ fn read_body<V: Values>(
     for element in header.elements.iter().take(used.map_or(0, |last| last + 1)) {
         match &mut draft {
             None if is_vertices(element) => {
+                check_memory(path, array_bytes(header, values.left()))?;
                 let Vertices { origin, xyz, normals, uvs } = read_vertices(path, element, values)?;
                 draft = Some(Draft { origin, xyz, normals, uvs, ..Draft::default() });
             }
@@ -105,6 +107,15 @@ fn read_body<V: Values>(
         read_faces(path, element, values, &mut draft)?;
     }
     Ok(draft.finish())
+}
+
+/// Bytes of the arrays of all vertices and triangles, if faces are triangles; never out of proportion
+/// to the `left` bytes of the file, whatever the header claims.
+fn array_bytes(header: &Header, left: u64) -> u64 {
+    let count = |name| header.elements.iter().filter(move |e| e.name == name).map(|e| e.count);
+    let sum = |name: &'static str| count(name).fold(0, u64::saturating_add);
+    // A vertex takes three bytes of a file at least, a face four.
+    12 * (sum("vertex").min(left / 3) + sum("face").min(left / 4))
 }
 
 fn read_vertices<V: Values>(

@@ -9,6 +9,7 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use super::document::Document;
 use super::error::ReadError;
+use super::mesh::NonFinite;
 use super::mistakes::Mistakes;
 use super::scene_toml::{Interpreted, interpret};
 use crate::geometry::freeform::FreeformSurface;
@@ -21,6 +22,8 @@ pub struct LoadOptions {
     pub set: Vec<String>,
     /// Which of several cameras.
     pub camera: Option<String>,
+    /// What becomes of triangles that are not finite, where an object does not say.
+    pub non_finite: NonFinite,
 }
 
 /// A scene as loaded.
@@ -77,7 +80,7 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<LoadedScene, Loa
     if !mistakes.is_empty() {
         return Err(Mistakes(mistakes).into());
     }
-    let Interpreted { scene, warnings } = interpret(&document, folder, options.camera.as_deref())?;
+    let Interpreted { scene, warnings } = interpret(&document, folder, options)?;
     let hash = hash(&scene, &text, options);
     Ok(LoadedScene { scene, warnings, hash })
 }

@@ -7,6 +7,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::error::ReadError;
+use super::memory::check_memory;
 
 /// Bytes that one task reads at a time.
 pub(super) const CHUNK: usize = 4 << 20;
@@ -58,6 +59,7 @@ impl<'a> Source<'a> {
     pub fn read_from(&self, offset: u64) -> Result<Vec<u8>, ReadError> {
         let n = usize::try_from(self.len.saturating_sub(offset))
             .map_err(|_| ReadError::file(self.path, "the file does not fit into memory"))?;
+        check_memory(self.path, n as u64)?;
         let mut bytes = vec![0; n];
         bytes
             .par_chunks_mut(CHUNK)
@@ -77,6 +79,18 @@ mod tests {
         assert_eq!(text("/").as_deref(), Some("/: not a regular file"));
         assert_eq!(text("/dev/zero").as_deref(), Some("/dev/zero: not a regular file"));
         assert!(text("/nowhere").is_some_and(|t| t.starts_with("/nowhere: cannot open: ")));
+    }
+
+    #[test]
+    fn a_file_that_shrinks_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ply");
+        std::fs::write(&path, [0; 100]).unwrap();
+        let source = Source::open(&path).unwrap();
+        File::options().write(true).open(&path).unwrap().set_len(50).unwrap();
+        let text = source.read_from(0).unwrap_err().to_string();
+        assert!(text.contains("a.ply: cannot read"), "{text}");
+        assert!(source.read_at(&mut [0; 50], 0).is_ok());
     }
 
     #[test]

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::distinct::Distinct;
 use super::error::ReadError;
+use super::memory::check_memory;
 use super::mesh::{Draft, MeshFile, check_count, zeroed_positions};
 use super::source::Source;
 
@@ -46,6 +47,8 @@ pub(super) fn read(path: &Path) -> Result<MeshFile, ReadError> {
         );
         return Err(ReadError::byte(path, 80, message));
     }
+    // Indices, and in a closed mesh half a vertex a triangle; welding takes some more.
+    check_memory(path, count * 30)?;
     let mut draft = read_binary(&source, count)?;
     if source.len > binary_len {
         let message =

@@ -6,6 +6,7 @@
 
 mod bounds;
 mod lanes;
+pub(crate) mod noise;
 mod quartic;
 mod ray;
 mod rounding;

@@ -18,7 +18,7 @@ use super::requirements::{Contents, Requirements, has_clear_shadows};
 use super::surface::SurfacePoint;
 use super::tessellate::{Tessellation, tessellate};
 use super::volumes::{check_volumes, placed_volumes};
-use crate::accel::{Accel, AccelError, AccelKind, BuildOptions, Hit, World};
+use crate::accel::{Accel, AccelError, AccelKind, BuildOptions, Hit, MemoryEstimate, World};
 use crate::camera::{Camera, Lens, Pose, Projection};
 use crate::color::Rgb;
 use crate::light::{Light, LightTree};
@@ -63,6 +63,10 @@ pub struct Scene {
     pub bounds: Bounds,
     /// The structure that answers ray queries.
     pub accel: Accel,
+    /// What it was expected to take.
+    pub memory_estimate: MemoryEstimate,
+    /// Whether it is of the compact form.
+    pub is_compact: bool,
     pub(super) world: World,
     pub(super) materials: Vec<Material>,
     /// What each material gives off; none where none does.
@@ -418,11 +422,13 @@ impl Scene {
             lit_automatically: !has_own_light,
         });
 
-        let options = BuildOptions {
+        let mut options = BuildOptions {
             precision: desc.settings.precision,
             quality: desc.settings.build_quality,
             ..options.clone()
         };
+        let memory_estimate =
+            options.fit(&world, desc.settings.compact).map_err(|e| vec![e.into()])?;
         let accel = Accel::build(&world, &options, progress).map_err(|e| vec![e.into()])?;
         let mut scene = Self {
             size,
@@ -440,6 +446,8 @@ impl Scene {
             center,
             bounds,
             accel,
+            memory_estimate,
+            is_compact: options.compact,
             world,
             materials,
             emissions,

@@ -7,7 +7,7 @@ use glam::{DAffine3, DMat4, DVec3};
 
 use super::maps::Maps;
 use super::volumes::VolumeDesc;
-use crate::accel::{BuildQuality, Precision};
+use crate::accel::{BuildQuality, Compact, Precision};
 use crate::camera::Projection;
 use crate::color::Rgb;
 use crate::film::Filter;
@@ -171,6 +171,8 @@ pub struct RenderSettings {
     pub epsilon: Epsilon,
     /// Work put into the hierarchy.
     pub build_quality: BuildQuality,
+    /// Whether it takes half the memory, and longer to trace.
+    pub compact: Compact,
     /// How far triangles may be from the freeform surfaces that they stand for.
     pub tolerance: Tolerance,
 }
@@ -192,6 +194,7 @@ impl Default for RenderSettings {
             filter: Filter::default(),
             epsilon: Epsilon::Auto,
             build_quality: BuildQuality::default(),
+            compact: Compact::default(),
             tolerance: Tolerance::Pixels(0.5),
         }
     }

@@ -12,7 +12,6 @@ mod checker;
 mod data;
 mod image;
 mod mipmap;
-mod noise;
 mod pattern;
 mod place;
 mod ramp;

@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::noise::{fbm, turbulence};
 use super::place::{Placement, Region};
 use super::ramp::Ramp;
 use super::{BumpGradient, TexturePoint};
 use crate::color::Rgb;
+use crate::math::noise::{fbm, turbulence};
 
 /// Clouds: gradient noise in octaves, through colours.
 #[derive(Debug, Clone, PartialEq)]

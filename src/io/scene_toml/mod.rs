@@ -19,8 +19,9 @@ use glam::DAffine3;
 use super::document::{Document, Node};
 use super::fields::{Fields, Reader};
 use super::grid::SampleLayout;
-use super::mesh::read_mesh;
+use super::mesh::{NonFinite, read_mesh};
 use super::mistakes::Mistakes;
+use super::scene_file::LoadOptions;
 use super::transforms::transform;
 use crate::geometry::grid::Grid;
 use crate::scene::{ObjectDesc, PrototypeDesc, Reference, SceneDesc, ShapeDesc};
@@ -37,12 +38,11 @@ pub(super) struct Interpreted {
     pub(super) warnings: Vec<String>,
 }
 
-/// Makes a scene of a document. File names in it are relative to `folder`; `camera` chooses among
-/// several cameras.
+/// Makes a scene of a document. File names in it are relative to `folder`.
 pub(super) fn interpret(
     document: &Document,
     folder: &Path,
-    camera: Option<&str>,
+    options: &LoadOptions,
 ) -> Result<Interpreted, Mistakes> {
     let reader = Reader::new(document);
     let mut scene = Interpreter {
@@ -50,10 +50,11 @@ pub(super) fn interpret(
         folder,
         scene: SceneDesc::default(),
         warnings: Vec::new(),
+        non_finite: options.non_finite,
         meshes: HashMap::new(),
         grids: HashMap::new(),
     };
-    scene.root(camera);
+    scene.root(options.camera.as_deref());
     let Interpreter { scene, warnings, .. } = scene;
     reader.finish()?;
     Ok(Interpreted { scene, warnings })
@@ -64,10 +65,21 @@ struct Interpreter<'d, 'r> {
     folder: &'r Path,
     scene: SceneDesc,
     warnings: Vec<String>,
+    /// What becomes of triangles that are not finite, where an object does not say.
+    non_finite: NonFinite,
     /// Mesh files by path: read once, however often they are named.
-    meshes: HashMap<PathBuf, Option<usize>>,
+    meshes: HashMap<PathBuf, Option<ReadMesh>>,
     /// Grids by path, and by layout where the file does not tell it.
     grids: HashMap<(PathBuf, Option<SampleLayout>), Option<Arc<Grid>>>,
+}
+
+/// A mesh file that was read.
+#[derive(Clone)]
+struct ReadMesh {
+    /// Index into [`SceneDesc::meshes`].
+    index: usize,
+    /// See [`super::mesh::MeshFile::non_finite`].
+    non_finite: Option<String>,
 }
 
 impl<'d, 'r> Interpreter<'d, 'r> {
@@ -235,26 +247,40 @@ impl<'d, 'r> Interpreter<'d, 'r> {
     }
 
     pub(super) fn mesh_file(&mut self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<usize> {
+        let non_finite = fields
+            .choice("non_finite", &NonFinite::ALL.map(|n| (n.name(), n)))
+            .unwrap_or(self.non_finite);
         let name = fields.text(node, "mesh")?;
         let path = self.folder.join(name);
         // One file under two names is read once.
         let key = path.canonicalize().unwrap_or_else(|_| path.clone());
-        if let Some(known) = self.meshes.get(&key) {
-            return *known;
+        if !self.meshes.contains_key(&key) {
+            let read = self.read_mesh(&path, node);
+            self.meshes.insert(key.clone(), read);
         }
-        let index = match read_mesh(&path) {
+        let mesh = self.meshes[&key].as_ref()?;
+        match &mesh.non_finite {
+            Some(which) if non_finite == NonFinite::Refuse => {
+                self.reader.mistake(node.span, format!("{}: {which}", path.display()));
+                None
+            }
+            _ => Some(mesh.index),
+        }
+    }
+
+    fn read_mesh(&mut self, path: &Path, node: &'d Node) -> Option<ReadMesh> {
+        match read_mesh(path) {
             Ok(file) => {
                 let warnings = file.warnings.iter().map(|w| format!("{}: {w}", path.display()));
                 self.warnings.extend(warnings);
                 self.scene.meshes.push(file.mesh);
-                Some(self.scene.meshes.len() - 1)
+                let index = self.scene.meshes.len() - 1;
+                Some(ReadMesh { index, non_finite: file.non_finite })
             }
             Err(error) => {
                 self.reader.mistake(node.span, error.to_string());
                 None
             }
-        };
-        self.meshes.insert(key, index);
-        index
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! `[render]`.
 
 use super::freeform::tolerance;
-use crate::accel::{BuildQuality, Precision};
+use crate::accel::{BuildQuality, Compact, Precision};
 use crate::color::{VISIBLE_MAX, VISIBLE_MIN};
 use crate::film::Filter;
 use crate::io::document::{Node, Value};
@@ -49,10 +49,24 @@ pub(super) fn settings(reader: &Reader<'_>, fields: Fields<'_, '_>) -> RenderSet
         build_quality: fields
             .choice("build_quality", &BuildQuality::ALL.map(|q| (q.name(), q)))
             .unwrap_or(default.build_quality),
+        compact: compact(&fields).unwrap_or(default.compact),
         tolerance: tolerance(&fields).unwrap_or(default.tolerance),
     };
     fields.finish();
     settings
+}
+
+fn compact(fields: &Fields<'_, '_>) -> Option<Compact> {
+    let node = fields.get("compact")?;
+    match &node.value {
+        Value::Bool(true) => Some(Compact::On),
+        Value::Bool(false) => Some(Compact::Off),
+        Value::String(text) if text == "auto" => Some(Compact::Auto),
+        _ => {
+            fields.expected(node, "compact", "\"auto\", true or false");
+            None
+        }
+    }
 }
 
 /// `true`, `false`, or what becomes of light that meets glass.

@@ -1,0 +1,10 @@
+#![no_main]
+
+use alhazen_fuzz::{allow_caught_panics, as_file};
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    allow_caught_panics();
+    as_file("input.exr", data, |path| {
+        let _ = alhazen::io::read_exr(path);
+    });
+});

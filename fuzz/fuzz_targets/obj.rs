@@ -1,0 +1,5 @@
+#![no_main]
+
+use alhazen_fuzz::{as_file, check_mesh};
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| as_file("input.obj", data, check_mesh));
