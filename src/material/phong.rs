@@ -60,15 +60,15 @@ impl Phong {
     /// Radiance towards `wo` for each unit of irradiance on a plane facing `wi`, `cos_theta` = n·wi > 0.
     #[inline]
     pub(super) fn response(&self, n: Vec3, wo: Vec3, wi: Vec3, cos_theta: f32) -> Rgb {
+        let diffuse = self.diffuse * (cos_theta * FRAC_1_PI);
         if self.specular.is_black() {
-            return self.diffuse * (cos_theta * FRAC_1_PI);
+            return diffuse;
         }
-        let diffuse = self.diffuse * cos_theta;
         let cos_alpha = match self.model {
             PhongModel::BlinnPhong => n.dot((wi + wo).normalize_or_zero()),
             PhongModel::Phong => (n * (2.0 * cos_theta) - wi).dot(wo),
         };
         let highlight = cos_alpha.clamp(0.0, 1.0).powf(self.shininess);
-        (diffuse + self.specular * highlight) * FRAC_1_PI
+        diffuse + self.specular * (highlight * FRAC_1_PI)
     }
 }

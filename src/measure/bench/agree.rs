@@ -189,7 +189,8 @@ impl Judge<'_> {
     }
 
     /// Whether the reference gives the answer too for one of four rays close by, or missed a triangle, a
-    /// needle perhaps, by so little that a hit is right too.
+    /// needle perhaps, by so little that a hit is right too; or the ray begins on what it is said
+    /// to hit.
     fn is_at_edge(
         &self,
         ray: &Ray,
@@ -200,7 +201,8 @@ impl Judge<'_> {
         let by = 32.0 * f32::EPSILON * (ray.origin.abs().max_element() + self.reach);
         if let Some(got) = got
             && expected.is_none_or(|expected| got.t < expected.t)
-            && self.passes(ray, got).is_some_and(|distance| distance <= f64::from(by))
+            && (self.begins_on(ray, got)
+                || self.passes(ray, got).is_some_and(|distance| distance <= f64::from(by)))
         {
             return true;
         }
@@ -220,6 +222,14 @@ impl Judge<'_> {
             (Some(a), Some(b)) => (a.t - b.t).abs() <= self.tolerance(ray, a, by),
             _ => false,
         })
+    }
+
+    /// Whether the origin of a ray lies on the very surface that it is said to hit, to the last bit or two:
+    /// nearer than rays start that leave a surface.
+    fn begins_on(&self, ray: &Ray, hit: &Hit) -> bool {
+        let point = self.scene.surface(ray, hit);
+        let lift = (ray.origin - point.position).dot(point.geometric_normal).abs();
+        lift <= f32::EPSILON * ray.origin.abs().max_element() && hit.t <= 1e-3 * self.reach
     }
 
     /// How far the ray passes from the rim of the triangle that it is said to hit, where it crosses the plane
