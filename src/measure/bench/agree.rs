@@ -247,6 +247,10 @@ impl Judge<'_> {
         let [a, b, c] = corners;
         let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
         let n = (b - a).cross(c - a);
+        // A triangle without area is all rim.
+        if n.length_squared() == 0.0 {
+            return Some(0.0);
+        }
         let t = n.dot(a - o) / n.dot(d);
         if !(t > f64::from(ray.t_min) && t <= f64::from(ray.t_max)) {
             return None;
