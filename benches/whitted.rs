@@ -7,16 +7,14 @@
 
 mod common;
 
-use std::sync::Mutex;
-
-use alhazen::accel::{Accel, Hit, HitBlock, RayBlock, RayQuery};
+use alhazen::accel::{Accel, RayQuery};
 use alhazen::film::Picture;
-use alhazen::integrator::{CameraBlock, Integrator, RayCounts, Tree, Whitted};
-use alhazen::math::Ray;
+use alhazen::integrator::{Tree, Whitted};
 use alhazen::measure::{CompareOptions, compare};
 use alhazen::render::{RenderJob, render};
 use alhazen::scene::{Scene, Shadows};
-use common::{camera_blocks, median, peers, seconds, w2};
+use common::record::{Query, record};
+use common::{median, peers, seconds, w2};
 use rayon::prelude::*;
 
 const ROUNDS: usize = 5;
@@ -117,7 +115,8 @@ fn against_mitsuba(scene: &Scene) {
 }
 
 fn measure<Q: RayQuery>(scene: &Scene, query: &Q) {
-    let (queries, counts) = record(scene, query);
+    let whitted = Whitted::<Tree>::new(Some(scene.settings.max_depth));
+    let (queries, counts) = record(scene, query, &whitted);
     println!(
         "{} camera, {} shadow, {} reflection, {} refraction rays; {:.1} % in packets",
         counts.camera,
@@ -149,109 +148,4 @@ fn measure<Q: RayQuery>(scene: &Scene, query: &Q) {
     let ratio = |i: usize, j: usize| median(rounds.iter().map(|r| r[i] / r[j]).collect());
     println!("whole render / its queries: {:.2}", ratio(0, 1));
     println!("one by one / in packets where it traces packets: {:.2}", ratio(2, 1));
-}
-
-/// A query that was asked.
-enum Query {
-    Closest(Ray),
-    Any(Ray),
-    ClosestBlock(Box<RayBlock>),
-    AnyBlock(Box<RayBlock>),
-}
-
-impl Query {
-    fn in_packet(&self) -> u64 {
-        match self {
-            Self::Closest(_) | Self::Any(_) => 0,
-            Self::ClosestBlock(rays) | Self::AnyBlock(rays) => rays.active().count_ones().into(),
-        }
-    }
-
-    fn run(&self, query: &impl RayQuery) {
-        match self {
-            Self::Closest(ray) => drop(std::hint::black_box(query.intersect(ray))),
-            Self::Any(ray) => _ = std::hint::black_box(query.occluded(ray)),
-            Self::ClosestBlock(rays) => drop(std::hint::black_box(query.intersect_block(rays))),
-            Self::AnyBlock(rays) => _ = std::hint::black_box(query.occluded_block(rays)),
-        }
-    }
-
-    fn run_single(&self, query: &impl RayQuery) {
-        match self {
-            Self::Closest(_) | Self::Any(_) => self.run(query),
-            Self::ClosestBlock(rays) => rays.lanes().for_each(|lane| {
-                let _ = std::hint::black_box(query.intersect(&rays.get(lane)));
-            }),
-            Self::AnyBlock(rays) => rays.lanes().for_each(|lane| {
-                let _ = std::hint::black_box(query.occluded(&rays.get(lane)));
-            }),
-        }
-    }
-}
-
-/// Answers queries and writes them down.
-struct Recorder<'a, Q> {
-    query: &'a Q,
-    asked: Mutex<Vec<Query>>,
-}
-
-impl<Q> Recorder<'_, Q> {
-    fn note(&self, query: Query) {
-        self.asked.lock().expect("no thread panicked").push(query);
-    }
-}
-
-impl<Q: RayQuery> RayQuery for Recorder<'_, Q> {
-    fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.note(Query::Closest(*ray));
-        self.query.intersect(ray)
-    }
-
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.note(Query::Any(*ray));
-        self.query.occluded(ray)
-    }
-
-    fn occluded_by_opaque(&self, ray: &Ray) -> bool {
-        self.query.occluded_by_opaque(ray)
-    }
-
-    fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
-        self.note(Query::ClosestBlock(Box::new(rays.clone())));
-        self.query.intersect_block(rays)
-    }
-
-    fn occluded_block(&self, rays: &RayBlock) -> u16 {
-        self.note(Query::AnyBlock(Box::new(rays.clone())));
-        self.query.occluded_block(rays)
-    }
-}
-
-/// All queries of the render, in the order of its blocks.
-fn record<Q: RayQuery>(scene: &Scene, query: &Q) -> (Vec<Query>, RayCounts) {
-    let whitted = Whitted::<Tree>::new(Some(scene.settings.max_depth));
-    let mut all = Vec::new();
-    let mut total = RayCounts::default();
-    for sample in 0..scene.settings.samples {
-        let blocks = camera_blocks(scene, sample);
-        let parts: Vec<_> = blocks
-            .par_chunks(64)
-            .map(|blocks| {
-                let recorder = Recorder { query, asked: Mutex::default() };
-                let mut counts = RayCounts::default();
-                for (rays, samplers) in blocks {
-                    counts.camera += u64::from(rays.active().count_ones());
-                    let hits = recorder.intersect_block(rays);
-                    let camera = CameraBlock { rays, hits: &hits, samplers };
-                    std::hint::black_box(whitted.shade(scene, &recorder, &camera, &mut counts));
-                }
-                (recorder.asked.into_inner().expect("no thread panicked"), counts)
-            })
-            .collect();
-        for (queries, counts) in parts {
-            all.extend(queries);
-            total.add(&counts);
-        }
-    }
-    (all, total)
 }

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use alhazen::embree::{
-    BuildProgress, Device, DeviceConfig, EmbreeError, ErrorCode, Geometry, INVALID_ID, PacketMask,
-    Quality, Ray, RayHitPacket, RayPacket, Scene, SceneBuilder, SceneFlags, UserBounds,
+    BuildProgress, Coherence, Device, DeviceConfig, EmbreeError, ErrorCode, Geometry, INVALID_ID,
+    PacketMask, Quality, Ray, RayHitPacket, RayPacket, Scene, SceneBuilder, SceneFlags, UserBounds,
     UserGeometry, UserHit,
 };
 
@@ -172,7 +172,7 @@ fn varied_scene(device: &Device) -> Scene {
 }
 
 fn compare_packets<const N: usize>(scene: &Scene, random: &mut Random) {
-    for _ in 0..400 {
+    for i in 0..400 {
         let x = random.between(-1.0, 26.0) as f32;
         let rays: [Ray; N] = std::array::from_fn(|_| Ray {
             origin: [x + 0.5 * random.unit() as f32, random.between(-0.5, 3.5) as f32, 9.0],
@@ -189,8 +189,9 @@ fn compare_packets<const N: usize>(scene: &Scene, random: &mut Random) {
         }
         let mask = PacketMask::from_bits(bits);
         let mut both = RayHitPacket::new(packet);
-        scene.intersect_packet(&mask, &mut both);
-        scene.occluded_packet(&mask, &mut packet);
+        let coherence = [Coherence::Coherent, Coherence::Incoherent][i % 2];
+        scene.intersect_packet(&mask, &mut both, coherence);
+        scene.occluded_packet(&mask, &mut packet, coherence);
         for (i, ray) in rays.iter().enumerate() {
             if bits >> i & 1 == 0 {
                 assert_eq!(both.hit.geometry[i], INVALID_ID, "a masked lane was touched");

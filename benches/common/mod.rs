@@ -2,6 +2,7 @@
 #![allow(dead_code, missing_docs, reason = "not every benchmark uses everything")]
 
 pub mod peers;
+pub mod record;
 pub mod w2;
 
 use std::time::Instant;
@@ -95,11 +96,17 @@ pub fn terrain(cells: u32) -> Scene {
     Scene::build_quietly(desc, AccelKind::default()).expect("a sound scene")
 }
 
-/// The camera rays of one sample that `render` traces for seed 0, block by block.
+/// The camera rays of one sample that `render` traces for seed 0, block by block; tile by tile as there,
+/// as neighbours in the picture find more in the caches.
 pub fn camera_blocks(scene: &Scene, sample: u32) -> Vec<(RayBlock, [Sampler; LANES])> {
     let filter = FilterTable::new(scene.settings.filter);
     let [width, height] = scene.size;
-    let origins = (0..height).step_by(4).flat_map(|y| (0..width).step_by(4).map(move |x| [x, y]));
+    let steps = |from: u32, to: u32, step: usize| (from..to).step_by(step);
+    let tiles = steps(0, height, 32).flat_map(|y| steps(0, width, 32).map(move |x| [x, y]));
+    let origins = tiles.flat_map(|[x0, y0]| {
+        let rows = steps(y0, height.min(y0 + 32), 4);
+        rows.flat_map(move |y| steps(x0, width.min(x0 + 32), 4).map(move |x| [x, y]))
+    });
     let block = |[x0, y0]: [u32; 2]| {
         let mut block = RayBlock::empty();
         let pixel = |lane: usize| [x0 + lane as u32 % 4, y0 + lane as u32 / 4];

@@ -23,8 +23,8 @@ mod world;
 
 use std::fmt;
 
-pub(crate) use block::lanes_of;
 pub use block::{HitBlock, LANES, RayBlock};
+pub(crate) use block::{lanes_of, lanes_where};
 pub use brute::BruteForce;
 pub use bvh::BvhAccel;
 #[cfg(feature = "crates")]

@@ -61,7 +61,7 @@ mod user;
 pub use device::{Device, DeviceConfig, Isa, MemoryUse};
 pub use error::{EmbreeError, ErrorCode};
 pub use geometry::{Geometry, Quality, Transform3x4};
-pub use query::{Hit, HitPacket, PacketMask, Ray, RayHitPacket, RayPacket};
+pub use query::{Coherence, Hit, HitPacket, PacketMask, Ray, RayHitPacket, RayPacket};
 pub use scene::{BuildProgress, Scene, SceneBuilder, SceneFlags};
 pub use user::{UserBounds, UserGeometry, UserHit};
 

@@ -93,6 +93,24 @@ impl<const N: usize> PacketMask<N> {
     }
 }
 
+/// How the rays of a packet are led through the hierarchy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coherence {
+    /// Together (`RTC_RAY_QUERY_FLAG_COHERENT`): for camera rays, and shadow rays from what they hit.
+    Coherent,
+    /// Each for itself as soon as few are left that go the same way (`RTC_RAY_QUERY_FLAG_INCOHERENT`).
+    Incoherent,
+}
+
+impl Coherence {
+    pub(super) const fn flags(self) -> sys::RTCRayQueryFlags {
+        match self {
+            Self::Coherent => sys::RTC_RAY_QUERY_FLAG_COHERENT,
+            Self::Incoherent => sys::RTC_RAY_QUERY_FLAG_INCOHERENT,
+        }
+    }
+}
+
 /// `N` rays side by side (`RTCRay4`, `RTCRay8`, `RTCRay16`).
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use super::device::Device;
 use super::error::{EmbreeError, ErrorCode};
 use super::geometry::{Geometry, Quality};
-use super::query::{Hit, PacketMask, Ray, RayHitPacket, RayPacket};
+use super::query::{Coherence, Hit, PacketMask, Ray, RayHitPacket, RayPacket};
 use super::user::UserBounds;
 use super::{INVALID_ID, sys};
 
@@ -194,18 +194,19 @@ impl Scene {
         native.tfar == f32::NEG_INFINITY
     }
 
-    /// The closest hits of the lanes in `mask`, of 4, 8 or 16 rays that run close together
-    /// (`RTC_RAY_QUERY_FLAG_COHERENT`). Worth it for camera rays at the native width, and for
-    /// nothing else: rays that spread are two to three times slower than one by one.
+    /// The closest hits of the lanes in `mask`, of 4, 8 or 16 rays. Worth it at the native width for rays
+    /// that run close together, and for nothing else: rays that spread are two to three times slower than
+    /// one by one.
     #[inline]
     pub fn intersect_packet<const N: usize>(
         &self,
         mask: &PacketMask<N>,
         packet: &mut RayHitPacket<N>,
+        coherence: Coherence,
     ) {
         const { assert!(N == 4 || N == 8 || N == 16, "Embree has packets of 4, 8 and 16") };
         let mut args = sys::RTCIntersectArguments {
-            flags: sys::RTC_RAY_QUERY_FLAG_COHERENT,
+            flags: coherence.flags(),
             feature_mask: sys::RTC_FEATURE_FLAG_ALL,
             context: null_mut(),
             filter: None,
@@ -226,10 +227,15 @@ impl Scene {
 
     /// Whether anything blocks the lanes in `mask`; see [`RayPacket::is_occluded`].
     #[inline]
-    pub fn occluded_packet<const N: usize>(&self, mask: &PacketMask<N>, packet: &mut RayPacket<N>) {
+    pub fn occluded_packet<const N: usize>(
+        &self,
+        mask: &PacketMask<N>,
+        packet: &mut RayPacket<N>,
+        coherence: Coherence,
+    ) {
         const { assert!(N == 4 || N == 8 || N == 16, "Embree has packets of 4, 8 and 16") };
         let mut args = sys::RTCOccludedArguments {
-            flags: sys::RTC_RAY_QUERY_FLAG_COHERENT,
+            flags: coherence.flags(),
             feature_mask: sys::RTC_FEATURE_FLAG_ALL,
             context: null_mut(),
             filter: None,

@@ -188,6 +188,31 @@ pub struct BlockPixels {
     pub standard_error: [Rgb; BLOCK_LANES],
 }
 
+impl BlockPixels {
+    /// What [`BlockAccumulator`] makes of a single sample, and which lanes it dropped: most previews are
+    /// no more than that.
+    pub fn of_one_sample(
+        origin: [u32; 2],
+        valid: u16,
+        radiance: &[Rgb; BLOCK_LANES],
+    ) -> (Self, u16) {
+        let mut pixels = Self {
+            origin,
+            mean: [Rgb::BLACK; BLOCK_LANES],
+            standard_error: [Rgb::splat(f32::NAN); BLOCK_LANES],
+        };
+        let mut dropped = 0;
+        for (lane, value) in radiance.iter().enumerate() {
+            let is_valid = valid >> lane & 1 == 1;
+            let counts = is_valid & value.is_finite();
+            dropped |= u16::from(is_valid & !counts) << lane;
+            // From nothing, as sums begin: −0 becomes 0.
+            pixels.mean[lane] = Rgb::BLACK + if counts { *value } else { Rgb::BLACK };
+        }
+        (pixels, dropped)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -232,6 +257,21 @@ mod tests {
         assert_eq!(block.add(1, u16::MAX, &[Rgb::splat(4.0); BLOCK_LANES]), 0);
         let pixels = block.finish([0, 0]);
         assert_eq!((pixels.mean[3].r, pixels.mean[4].r), (4.0, 3.0));
+    }
+
+    #[test]
+    fn one_sample_is_the_same_without_sums() {
+        let mut radiance = std::array::from_fn(|lane| Rgb::new(0.1, lane as f32, -0.0));
+        radiance[5] = Rgb::new(f32::INFINITY, 0.0, 0.0);
+        radiance[15] = Rgb::splat(f32::NAN);
+        let mut block = BlockAccumulator::new(4);
+        block.restart(0);
+        let dropped = block.add(0, 0x7fff, &radiance);
+        let (pixels, also) = BlockPixels::of_one_sample([8, 4], 0x7fff, &radiance);
+        assert_eq!((also, dropped), (1 << 5, 1 << 5));
+        let expected = block.finish([8, 4]);
+        assert_eq!((pixels.origin, pixels.mean), (expected.origin, expected.mean));
+        assert!(pixels.standard_error.iter().all(|e| e.r.is_nan() && e.g.is_nan() && e.b.is_nan()));
     }
 
     #[test]

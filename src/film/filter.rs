@@ -149,6 +149,26 @@ impl FilterTable {
     }
 }
 
+impl FilterTable {
+    /// [`FilterTable::sample`] of `N` pairs of numbers: offsets across, offsets down, weights.
+    #[inline(always)]
+    pub fn sample_lanes<const N: usize>(&self, u: &[f32; N], v: &[f32; N]) -> [[f32; N]; 3] {
+        let (mut x, mut y, mut weight) = ([0.0; N], [0.0; N], [1.0; N]);
+        if self.inverse.is_empty() {
+            // For the compiler to turn into vector instructions.
+            for i in 0..N {
+                (x[i], y[i]) = (u[i] - 0.5, v[i] - 0.5);
+            }
+            return [x, y, weight];
+        }
+        for i in 0..N {
+            let sample = self.sample([u[i], v[i]]);
+            ([x[i], y[i]], weight[i]) = (sample.offset, sample.weight);
+        }
+        [x, y, weight]
+    }
+}
+
 /// Where the Mitchell filter crosses zero, by bisection between 1 and 1.5.
 fn mitchell_zero() -> f64 {
     let (mut positive, mut negative) = (1.0, 1.5);
@@ -173,6 +193,8 @@ mod tests {
             for i in 0..n {
                 let u = (i as f32 + 0.5) / n as f32;
                 let s = table.sample([u, 0.5]);
+                let lanes = table.sample_lanes(&[0.2, u], &[0.7, 0.5]).map(|lane| lane[1]);
+                assert_eq!(lanes, [s.offset[0], s.offset[1], s.weight]);
                 // The second axis is drawn at its centre, where the filter is positive.
                 let (x, w) = (f64::from(s.offset[0]), f64::from(s.weight / table.scale));
                 for (k, d) in drawn.iter_mut().enumerate() {

@@ -9,6 +9,8 @@ pub use accumulate::{BLOCK_LANES, BlockAccumulator, BlockPixels};
 pub use filter::{Filter, FilterSample, FilterTable};
 pub use picture::Picture;
 
+use rayon::prelude::*;
+
 use crate::color::Rgb;
 
 /// A rectangle of pixels: `x0 ≤ x < x1`, `y0 ≤ y < y1`, y down.
@@ -76,7 +78,8 @@ pub struct Film {
 impl Film {
     /// A black film; with a plane for errors where `with_error`.
     pub fn new(size: [u32; 2], window: PixelRect, with_error: bool) -> Self {
-        let plane = || vec![Rgb::BLACK; window.area()];
+        // On all threads: most of the time goes into asking the system for the memory.
+        let plane = || rayon::iter::repeat_n(Rgb::BLACK, window.area()).collect();
         Self { size, window, mean: plane(), standard_error: with_error.then(plane) }
     }
 

@@ -1,10 +1,10 @@
 //! Ambient occlusion: how much of its surroundings a point sees. A cheap look at shapes, without lights.
 
 use super::{CameraBlock, Integrator, RayCounts};
-use crate::accel::{LANES, RayQuery};
+use crate::accel::{LANES, RayQuery, lanes_where};
 use crate::color::Rgb;
-use crate::math::cosine_hemisphere;
-use crate::sampler::Dimensions;
+use crate::math::{Vec3Lanes, cosine_hemisphere};
+use crate::sampler::{Dimensions, Sampler};
 use crate::scene::Scene;
 
 /// 1 where a ray drawn in proportion to the cosine meets nothing within `ao_distance`, 0 where it does:
@@ -21,18 +21,24 @@ impl Integrator for Ao {
         counts: &mut RayCounts,
     ) -> [Rgb; LANES] {
         let distance = scene.settings.ao_distance.map_or(f32::INFINITY, |d| d as f32);
-        std::array::from_fn(|lane| {
-            let Some(hit) = camera.hits.get(lane) else { return scene.background };
-            let point = scene.surface(&camera.rays.get(lane), hit);
-            let [u, v, ..] = camera.samplers[lane].four(Dimensions::Direction);
-            let direction = cosine_hemisphere(point.normal, [u, v]);
-            // Below the surface, whatever its shading normal says.
-            if direction.dot(point.geometric_normal) <= 0.0 {
-                return Rgb::BLACK;
-            }
-            counts.diffuse += 1;
-            let blocked = query.occluded(&scene.spawn(&point, direction, distance));
-            if blocked { Rgb::BLACK } else { Rgb::splat(1.0) }
+        let points = scene.surfaces(camera.rays, camera.hits);
+        let [u, v] = Sampler::numbers(camera.samplers, Dimensions::Direction);
+        let mut directions = Vec3Lanes::ZERO;
+        let mut is_above = [false; LANES];
+        for i in 0..LANES {
+            let direction = cosine_hemisphere(points.normal.get(i), [u[i], v[i]]);
+            directions.set(i, direction);
+            // Not below the surface, whatever its shading normal says.
+            is_above[i] = direction.dot(points.geometric_normal.get(i)) > 0.0;
+        }
+        let above = lanes_where(&is_above) & points.hit();
+        counts.diffuse += u64::from(above.count_ones());
+        let rays = scene.spawn_block(&points, &directions, &[distance; LANES], above);
+        std::array::from_fn(|lane| match (points.hit() >> lane & 1, above >> lane & 1) {
+            (0, _) => scene.background,
+            // They spread: packets would be slower.
+            (_, 1) if !query.occluded(&rays.get(lane)) => Rgb::splat(1.0),
+            _ => Rgb::BLACK,
         })
     }
 }

@@ -9,7 +9,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::accel::{LANES, RayBlock, RayQuery, with_accel};
-use crate::film::{BLOCK_LANES, BlockAccumulator, Film, FilterTable, PixelRect};
+use crate::film::{BLOCK_LANES, BlockAccumulator, BlockPixels, Film, FilterTable, PixelRect};
 use crate::integrator::{
     Ao, CameraBlock, Everything, Flat, Integrator, Local, RayCounts, Tree, Whitted,
 };
@@ -187,7 +187,7 @@ struct TileRenderer<'a, Q, I> {
 
 #[derive(Default)]
 struct TileOutput {
-    blocks: Vec<crate::film::BlockPixels>,
+    blocks: Vec<BlockPixels>,
     rays: RayCounts,
     non_finite: NonFinite,
 }
@@ -264,7 +264,13 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             for (value, weight) in radiance.iter_mut().zip(weights) {
                 *value *= weight;
             }
-            let dropped = sums.add(sample, inside, &radiance);
+            let dropped = if self.samples == 1 {
+                let (pixels, dropped) = BlockPixels::of_one_sample(origin, inside, &radiance);
+                output.blocks.push(pixels);
+                dropped
+            } else {
+                sums.add(sample, inside, &radiance)
+            };
             for lane in (0..LANES).filter(|lane| dropped >> lane & 1 == 1) {
                 let [x, y] = pixel(lane);
                 if !wanted.contains(x, y) {
@@ -276,7 +282,9 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
                 }
             }
         }
-        output.blocks.push(sums.finish(origin));
+        if self.samples != 1 {
+            output.blocks.push(sums.finish(origin));
+        }
         true
     }
 
@@ -297,13 +305,11 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             let [u, v] = Sampler::numbers(samplers, Dimensions::Camera);
             (u, v, [[0.5; LANES]; 2])
         };
-        let (mut x, mut y, mut weights) = ([0.0; LANES], [0.0; LANES], [1.0; LANES]);
+        let [dx, dy, weights] = self.filter.sample_lanes(&u, &v);
+        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            let position = self.filter.sample([u[lane], v[lane]]);
-            let [dx, dy] = position.offset.map(f64::from);
-            x[lane] = f64::from(x0 + lane as u32 % 4) + 0.5 + dx;
-            y[lane] = f64::from(y0 + lane as u32 / 4) + 0.5 + dy;
-            weights[lane] = position.weight;
+            x[lane] = f64::from(x0 + lane as u32 % 4) + 0.5 + f64::from(dx[lane]);
+            y[lane] = f64::from(y0 + lane as u32 / 4) + 0.5 + f64::from(dy[lane]);
         }
         let mut rays = RayBlock::empty();
         if let Some((eye, directions)) = camera.pinhole_rays(&x, &y) {

@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::build::Scene;
 use super::surface::{Local, SurfacePoint, facing, on_triangle, smooth_normal, spawn, to_world};
 use crate::accel::{Geometry, HitBlock, LANES, RayBlock, lanes_of};
+use crate::geometry::TriangleMesh;
 use crate::material::Material;
 use crate::math::Vec3Lanes;
 
@@ -76,7 +77,9 @@ impl Scene {
             material: [0; LANES],
             hit: 0,
         };
-        // Triangles are gathered; what else there is follows one by one.
+        // Triangles are gathered, first their indices and then their corners, so that memory is asked for
+        // all that it takes a while to bring at once; what else there is follows one by one.
+        let mut faces: [Option<(&TriangleMesh, [u32; 3])>; LANES] = [None; LANES];
         let mut corners = [Vec3Lanes::<LANES>::ZERO; 3];
         let (mut u, mut v) = ([0.0; LANES], [0.0; LANES]);
         let mut smooth = Vec3Lanes::<LANES>::ZERO;
@@ -91,14 +94,18 @@ impl Scene {
             };
             block.material[lane] = self.look(hit).material;
             copies |= u16::from(hit.copy.is_some()) << lane;
-            let [a, b, c] = mesh.corners(hit.primitive as usize);
-            corners[0].set(lane, a);
-            corners[1].set(lane, b);
-            corners[2].set(lane, c);
+            faces[lane] = Some((mesh, mesh.triangles[hit.primitive as usize]));
             (u[lane], v[lane]) = (hit.u, hit.v);
             if let Some(normal) = smooth_normal(mesh, hit) {
                 smooth.set(lane, normal);
                 is_smooth[lane] = true;
+            }
+        }
+
+        for lane in lanes_of(block.hit & !others) {
+            let Some((mesh, face)) = faces[lane] else { continue };
+            for (corners, vertex) in corners.iter_mut().zip(face) {
+                corners.set(lane, mesh.positions.get(vertex as usize));
             }
         }
 

@@ -4,7 +4,7 @@
 #![expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 
 use super::super::{CameraBlock, RayCounts};
-use crate::accel::{HitBlock, LANES, RayQuery, lanes_of};
+use crate::accel::{LANES, RayQuery, lanes_of, lanes_where};
 use crate::color::Rgb;
 use crate::light::Light;
 use crate::math::Vec3Lanes;
@@ -43,7 +43,6 @@ pub(super) fn shade<Q: RayQuery>(
     counts.ends.miss += u64::from((camera.rays.active() & !points.hit()).count_ones());
     let mut radiance = [[0.0; LANES]; 3];
     let looks = looks(scene, &points, &mut radiance);
-    let in_packets = lie_together(camera.hits, looks.lit);
     for light in scene.lights.iter().filter(|_| looks.lit != 0) {
         let arriving = arriving(light, &points, looks.lit);
         let (light, lanes) = reflected(scene, camera, &points, &looks, &arriving);
@@ -54,12 +53,7 @@ pub(super) fn shade<Q: RayQuery>(
         if scene.settings.shadows.are_cast() {
             counts.shadow += u64::from(lanes.count_ones());
             let rays = scene.spawn_block(&points, &arriving.direction, &arriving.distance, lanes);
-            let blocked = |lane: &usize| query.occluded(&rays.get(*lane));
-            passes &= !if in_packets {
-                query.occluded_block(&rays)
-            } else {
-                lanes_of(lanes).filter(blocked).fold(0, |bits, lane| bits | 1 << lane)
-            };
+            passes &= !query.occluded_block(&rays);
         }
         for (sum, light) in radiance.iter_mut().zip(&light) {
             for i in 0..LANES {
@@ -73,25 +67,6 @@ pub(super) fn shade<Q: RayQuery>(
         }
         radiance.map(|c| c[lane]).into()
     })
-}
-
-/// Whether the hits of `lanes` lie on few copies, so that rays from there to a light run close together and
-/// are worth a packet. On a field of 10,000 copies, a few pixels across each, packets of shadow rays take 1.3
-/// times as long as single ones; on one mesh of a million triangles 0.7.
-fn lie_together(hits: &HitBlock, lanes: u16) -> bool {
-    const MOST: usize = 2;
-    let mut seen = [None; MOST];
-    let mut count = 0;
-    for copy in lanes_of(lanes).filter_map(|lane| hits.get(lane)).map(|hit| hit.copy) {
-        if !seen[..count].contains(&copy) {
-            if count == MOST {
-                return false;
-            }
-            seen[count] = copy;
-            count += 1;
-        }
-    }
-    true
 }
 
 /// What is lit and how; their ambient light is added to `radiance`.
@@ -166,10 +141,7 @@ fn reflected(
         }
         is_reflected[i] = is_before & !is_black;
     }
-    let bits = |flags: &[bool; LANES]| {
-        (0..LANES).fold(0u16, |bits, lane| bits | u16::from(flags[lane]) << lane)
-    };
-    let mut lanes = bits(&is_reflected);
+    let mut lanes = lanes_where(&is_reflected);
     for lane in lanes_of(looks.others & arriving.lanes) {
         let (point, l) = (points.point(scene, lane), arriving.direction.get(lane));
         let response = point.material.response(point.normal, -camera.rays.get(lane).direction, l);
