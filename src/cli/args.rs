@@ -1,11 +1,12 @@
 //! Flags as typed.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 
-use super::units::{parse_bytes, parse_count, parse_crop, parse_size};
+use super::units::{parse_bytes, parse_count, parse_crop, parse_share, parse_size, parse_time};
 use crate::accel::{AccelKind, BuildQuality, Precision};
 use crate::film::{Filter, PixelRect};
 use crate::geometry::generate::GeneratedKind;
@@ -150,6 +151,16 @@ pub(super) struct RenderArgs {
     /// Seed of all random numbers: same scene and seed, same picture
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) seed: u64,
+
+    /// Ends at a relative sampling error of the picture, as in 1% or 0.01, however many samples that takes.
+    /// With several of --error, --time and --samples, what comes first ends it
+    #[arg(long, value_name = "SHARE", value_parser = parse_share, conflicts_with = "crop")]
+    pub(super) error: Option<f64>,
+
+    /// Ends so that the files are written this long after the start, as in 30s, 5m or 1h30m. One sample
+    /// of every pixel is taken in any case
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    pub(super) time: Option<Duration>,
 
     /// Exposure of PNG files, in stops: 1 doubles the light
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]

@@ -19,7 +19,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
     let read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
     let clock = Instant::now();
-    let film = job::film_bytes(&PixelRect::whole(loaded.scene.image.size));
+    let film = job::film_bytes(&PixelRect::whole(loaded.scene.image.size), false);
     let pool = job::thread_pool(args.threads)?;
     let scene = pool.install(|| job::build(args, kind, loaded, film))?;
     let build = clock.elapsed().as_secs_f64();

@@ -2,7 +2,7 @@
 //! render, write.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -15,8 +15,11 @@ use crate::io::{
     ExrOptions, LoadOptions, LoadedScene, PixelType, WriteError, available_memory, check_writable,
     load_scene, write_exr, write_png,
 };
-use crate::render::{RenderJob, Rendered, render as run_render};
+use crate::render::{RenderJob, Rendered, Stop, StopRules, render as run_render};
 use crate::scene::{Scene, SceneError};
+
+/// Samples at which a render ends that was to reach an error or a time.
+const MOST_SAMPLES: u32 = 1 << 24;
 
 /// Seconds of each phase; `total` counts from the start of the program.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
@@ -56,14 +59,20 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     let hash = loaded.hash;
     let size = loaded.scene.image.size;
     let crop = args.crop.map(|crop| check_crop(crop, size)).transpose()?;
-    let film = film_bytes(&crop.unwrap_or(PixelRect::whole(size)));
+    let goes_on = args.error.is_some() || args.time.is_some();
+    let film = film_bytes(&crop.unwrap_or(PixelRect::whole(size)), goes_on);
     check_memory(size, film)?;
 
     let clock = Instant::now();
     let scene = pool.install(|| build(&args.scene, args.accel.kind, loaded, film))?;
     phases.build = clock.elapsed().as_secs_f64();
 
-    let job = RenderJob { crop, seed: args.seed, variant: None };
+    let job = RenderJob {
+        crop,
+        seed: args.seed,
+        variant: None,
+        stop: stop_rules(args, start, &crop.unwrap_or(PixelRect::whole(size))),
+    };
     let clock = Instant::now();
     let progress = Progress::new(quiet, "render");
     let rendered = pool.install(|| run_render(&scene, &job, &progress));
@@ -107,7 +116,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
             print(&format!("{:>10}  {}", "wrote", output.path.display()));
         }
     }
-    if rendered.interrupted {
+    if rendered.stop == Stop::Interrupted {
         tell("interrupted; the picture holds what was finished, the rest is black");
         return Ok(Outcome::Interrupted);
     }
@@ -168,9 +177,25 @@ pub(super) fn check_targets<'a>(
     Ok(())
 }
 
-/// Bytes that a picture takes: mean and error of a pixel, and what the encoders need beside them.
-pub(super) fn film_bytes(window: &PixelRect) -> u64 {
-    window.area() as u64 * 40
+/// Bytes that a picture takes: mean and error of a pixel, and what the encoders need beside them; with the
+/// sums of its samples where it may go on from there.
+pub(super) fn film_bytes(window: &PixelRect, goes_on: bool) -> u64 {
+    window.area() as u64 * if goes_on { 500 } else { 40 }
+}
+
+/// When the render is over, where anything but the scene's samples says so: its own number then counts no
+/// more, only that of the command line.
+fn stop_rules(args: &RenderArgs, start: Instant, window: &PixelRect) -> Option<StopRules> {
+    if args.error.is_none() && args.time.is_none() {
+        return None;
+    }
+    // Time counts until the file is written: a share is kept back, as measured for half and ZIP.
+    let write = Duration::from_secs_f64(0.02 + 1e-7 * window.area() as f64);
+    Some(StopRules {
+        samples: args.scene.samples.unwrap_or(MOST_SAMPLES),
+        error: args.error,
+        deadline: args.time.map(|time| start + time.saturating_sub(write)),
+    })
 }
 
 /// Refuses a picture that does not fit into memory, before the machine starts to swap.

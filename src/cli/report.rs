@@ -8,7 +8,7 @@ use super::units::{grouped, megabytes};
 use super::{Failure, job::Phases, print};
 use crate::accel::AccelInfo;
 use crate::io::{Attribute, AttributeValue};
-use crate::render::{RenderJob, Rendered};
+use crate::render::{RenderJob, Rendered, Stop};
 use crate::scene::{Epsilon, IntegratorKind, Scene};
 
 /// The fields of `--stats`; their names are stable.
@@ -22,7 +22,7 @@ struct Stats<'a> {
     samples: u32,
     /// Estimated relative sampling error; null at one sample a pixel.
     error: Option<f64>,
-    /// Why the render ended: "samples" or "interrupted".
+    /// Why the render ended: "samples", "error", "time" or "interrupted".
     stop: &'static str,
     non_finite_samples: u64,
     accelerator: String,
@@ -80,7 +80,7 @@ pub(super) fn write_stats(
         memory: Memory { peak_bytes: peak_bytes(), accelerator_bytes: accel.bytes },
         samples: rendered.samples,
         error: rendered.film.relative_error(),
-        stop: if rendered.interrupted { "interrupted" } else { "samples" },
+        stop: rendered.stop.name(),
         non_finite_samples: rendered.non_finite.count,
         accelerator: accel.to_string(),
     };
@@ -94,7 +94,12 @@ pub(super) fn print_table(phases: &Phases, rendered: &Rendered, accel: &AccelInf
     let film = &rendered.film;
     let line = |name: &str, value: String| print(&format!("{name:>10}  {value}"));
     let (w, h) = (film.window.width(), film.window.height());
-    line("picture", format!("{w} x {h}, {} per pixel", plural(rendered.samples, "sample")));
+    let end = match rendered.stop {
+        Stop::Samples | Stop::Interrupted => "",
+        Stop::Error => ", enough for the error",
+        Stop::Time => ", as many as the time allowed",
+    };
+    line("picture", format!("{w} x {h}, {} per pixel{end}", plural(rendered.samples, "sample")));
     line(
         "seconds",
         format!(
@@ -184,8 +189,8 @@ pub(super) fn attributes(
     if let Some(error) = rendered.film.relative_error() {
         list.push(Attribute { name: "alhazen.error", value: AttributeValue::Float(error) });
     }
-    if rendered.interrupted {
-        list.push(text("alhazen.stop", "interrupted".to_owned()));
+    if rendered.stop != Stop::Samples {
+        list.push(text("alhazen.stop", rendered.stop.name().to_owned()));
     }
     list
 }

@@ -1,5 +1,7 @@
 //! Sizes, rectangles and amounts of memory as people write them.
 
+use std::time::Duration;
+
 use crate::film::PixelRect;
 
 /// "1920x1080".
@@ -59,6 +61,43 @@ pub(super) fn parse_count(text: &str) -> Result<u64, String> {
     }
 }
 
+/// "30s", "1.5m", "2h", "1h30m": a number alone is seconds.
+pub(super) fn parse_time(text: &str) -> Result<Duration, String> {
+    let wrong = || "expected a time such as 30s, 1.5m or 1h30m".to_owned();
+    let mut seconds = 0.0;
+    let mut rest = text.trim();
+    while !rest.is_empty() {
+        let split = rest.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(rest.len());
+        let (number, after) = rest.split_at(split);
+        let end = after.find(|c: char| c.is_ascii_digit()).unwrap_or(after.len());
+        let (unit, after) = after.split_at(end);
+        let factor = match unit.trim() {
+            "ms" => 1e-3,
+            "s" | "" => 1.0,
+            "m" | "min" => 60.0,
+            "h" => 3600.0,
+            _ => return Err(wrong()),
+        };
+        seconds += number.parse::<f64>().map_err(|_| wrong())? * factor;
+        rest = after;
+    }
+    // A year is as good as for ever, and Instants can be that far.
+    if seconds > 0.0 && seconds <= 3.2e7 {
+        return Ok(Duration::from_secs_f64(seconds));
+    }
+    Err(wrong())
+}
+
+/// "1%", "0.5 %", "0.01": a share.
+pub(super) fn parse_share(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let (number, unit) = text.strip_suffix('%').map_or((text, 1.0), |number| (number, 0.01));
+    match number.trim().parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x * unit),
+        _ => Err("expected a share such as 1% or 0.01".to_owned()),
+    }
+}
+
 /// 1,234,567.
 pub(super) fn grouped(n: u64) -> String {
     let digits = n.to_string();
@@ -115,6 +154,29 @@ mod tests {
         assert_eq!(parse_count("12345678"), Ok(12_345_678));
         for bad in ["", "M", "-1", "1e400", "10Mi", "1.2.3"] {
             assert!(parse_count(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn times() {
+        let seconds = |text| parse_time(text).map(|time| time.as_secs_f64());
+        assert_eq!(seconds("30s"), Ok(30.0));
+        assert_eq!(seconds("2"), Ok(2.0));
+        assert_eq!(seconds("1.5m"), Ok(90.0));
+        assert_eq!(seconds("1h30m"), Ok(5400.0));
+        assert_eq!(seconds("250 ms"), Ok(0.25));
+        for bad in ["", "s", "0", "-1s", "1d", "1..5s", "1e400h", "99999h"] {
+            assert!(parse_time(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn shares() {
+        assert_eq!(parse_share("1%"), Ok(0.01));
+        assert_eq!(parse_share("0.5 %"), Ok(0.005));
+        assert_eq!(parse_share("0.02"), Ok(0.02));
+        for bad in ["", "%", "0", "-1%", "inf", "NaN", "1%%"] {
+            assert!(parse_share(bad).is_err(), "{bad}");
         }
     }
 

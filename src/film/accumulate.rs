@@ -102,6 +102,27 @@ impl BlockAccumulator {
         }
     }
 
+    /// Stores what was added so far, for [`BlockAccumulator::resume`]. It must begin with sample 0.
+    pub fn store(&self, sums: &mut BlockSums) {
+        sums.samples = self.replicates.iter().map(|replicate| replicate.end).sum();
+        sums.nodes.clear();
+        sums.nodes.reserve_exact(self.replicates.iter().map(|r| r.nodes.len()).sum());
+        for replicate in &self.replicates {
+            sums.nodes.extend(replicate.nodes.iter().map(|(_, node)| *node));
+        }
+    }
+
+    /// Goes on from what was stored of as many replicates.
+    pub fn resume(&mut self, sums: &BlockSums) {
+        self.restart(sums.samples);
+        let mut nodes = sums.nodes.iter();
+        for replicate in &mut self.replicates {
+            // Of the samples from 0 on: a node for each bit of their number, the largest first.
+            let levels = (0..u32::BITS).rev().filter(|level| replicate.end >> level & 1 == 1);
+            replicate.nodes.extend(levels.zip(&mut nodes).map(|(level, node)| (level, *node)));
+        }
+    }
+
     /// Adds sample `index` of all pixels, which must follow the one before it.
     ///
     /// Lanes that `valid` leaves out count as not sampled. A value that is not finite is left out too;
@@ -174,6 +195,15 @@ impl BlockAccumulator {
         }
         pixels
     }
+}
+
+/// The sums of the samples of a block from the first on, to be gone on from.
+#[derive(Debug, Clone, Default)]
+pub struct BlockSums {
+    /// How many samples.
+    samples: u32,
+    /// Of each replicate, the largest first.
+    nodes: Vec<Node>,
 }
 
 /// The finished pixels of a block.
@@ -257,6 +287,27 @@ mod tests {
         assert_eq!(block.add(1, u16::MAX, &[Rgb::splat(4.0); BLOCK_LANES]), 0);
         let pixels = block.finish([0, 0]);
         assert_eq!((pixels.mean[3].r, pixels.mean[4].r), (4.0, 3.0));
+    }
+
+    #[test]
+    fn what_is_stored_goes_on_to_the_same_bits() {
+        let value = |i: u32| [Rgb::new((i as f32).sin(), 1.0 / (i + 1) as f32, 0.1); BLOCK_LANES];
+        let mut whole = BlockAccumulator::new(4);
+        whole.restart(0);
+        let mut parts = BlockAccumulator::new(4);
+        parts.restart(0);
+        let mut stored = BlockSums::default();
+        for i in 0..300 {
+            whole.add(i, u16::MAX, &value(i));
+            parts.add(i, u16::MAX, &value(i));
+            if i % 7 == 0 {
+                parts.store(&mut stored);
+                parts.restart(5);
+                parts.resume(&stored);
+            }
+        }
+        let (a, b) = (whole.finish([0, 0]), parts.finish([0, 0]));
+        assert_eq!((a.mean, a.standard_error), (b.mean, b.standard_error));
     }
 
     #[test]

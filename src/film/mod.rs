@@ -5,7 +5,7 @@ mod accumulate;
 mod filter;
 mod picture;
 
-pub use accumulate::{BLOCK_LANES, BlockAccumulator, BlockPixels};
+pub use accumulate::{BLOCK_LANES, BlockAccumulator, BlockPixels, BlockSums};
 pub use filter::{Filter, FilterSample, FilterTable};
 pub use picture::Picture;
 
@@ -110,18 +110,28 @@ impl Film {
     /// Var\[mean\] / (mean² + ε), with ε = 0.01 · (mean luminance)². None where no pixel shows an error.
     pub fn relative_error(&self) -> Option<f64> {
         let errors = self.standard_error.as_ref()?;
+        // In parts of fixed size, for the same bits on any number of threads.
+        const PART: usize = 1 << 14;
         let n = self.mean.len().max(1) as f64;
-        let luminance = self.mean.iter().map(|c| f64::from(c.luminance())).sum::<f64>() / n;
+        let luminances = self.mean.par_chunks(PART);
+        let luminances: Vec<f64> = luminances
+            .map(|part| part.iter().map(|c| f64::from(c.luminance())).sum::<f64>())
+            .collect();
+        let luminance = luminances.into_iter().sum::<f64>() / n;
         let epsilon = 0.01 * luminance * luminance;
-        let values = self.mean.iter().zip(errors).flat_map(|(m, e)| {
-            m.to_array().into_iter().zip(e.to_array()).map(|(m, e)| (f64::from(m), f64::from(e)))
-        });
-        let known = values.filter(|(_, e)| !e.is_nan());
-        let (sum, count) = known.fold((0.0, 0u64), |(sum, count), (m, e)| {
+        let add = |(sum, count): (f64, u64), (m, e): (f32, f32)| {
+            let (m, e) = (f64::from(m), f64::from(e));
             // A black picture has no error, rather than 0/0.
             let share = if e == 0.0 { 0.0 } else { e * e / (m * m + epsilon) };
-            (sum + share, count + 1)
-        });
+            if e.is_nan() { (sum, count) } else { (sum + share, count + 1) }
+        };
+        let shares = |(means, errors): (&[Rgb], &[Rgb])| {
+            let channels = |(m, e): (&Rgb, &Rgb)| m.to_array().into_iter().zip(e.to_array());
+            means.iter().zip(errors).flat_map(channels).fold((0.0, 0), add)
+        };
+        let parts = self.mean.par_chunks(PART).zip(errors.par_chunks(PART));
+        let parts: Vec<(f64, u64)> = parts.map(shares).collect();
+        let (sum, count) = parts.into_iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         (count > 0).then(|| (sum / count as f64).sqrt())
     }
 }
