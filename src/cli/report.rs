@@ -163,10 +163,9 @@ pub(super) fn attributes(
     rendered: &Rendered,
     accel: &AccelInfo,
 ) -> Vec<Attribute> {
-    let text = |name, value: String| Attribute { name, value: AttributeValue::Text(value) };
+    let text = |name, value| Attribute::new(name, AttributeValue::Text(value));
     let integer = |name, value: u32| {
-        let value = AttributeValue::Integer(i32::try_from(value).unwrap_or(i32::MAX));
-        Attribute { name, value }
+        Attribute::new(name, AttributeValue::Integer(i32::try_from(value).unwrap_or(i32::MAX)))
     };
     let settings = &scene.settings;
     let mut list = vec![
@@ -181,13 +180,10 @@ pub(super) fn attributes(
         text("alhazen.isa", accel.isa.to_owned()),
         integer("alhazen.packetWidth", accel.packet_width as u32),
         text("alhazen.bias", biasing_options(scene)),
-        Attribute {
-            name: "alhazen.origin",
-            value: AttributeValue::Vector(scene.center.as_vec3().to_array()),
-        },
+        Attribute::new("alhazen.origin", AttributeValue::Vector(scene.center.as_vec3().to_array())),
     ];
     if let Some(error) = rendered.film.relative_error() {
-        list.push(Attribute { name: "alhazen.error", value: AttributeValue::Float(error) });
+        list.push(Attribute::new("alhazen.error", AttributeValue::Float(error)));
     }
     if rendered.stop != Stop::Samples {
         list.push(text("alhazen.stop", rendered.stop.name().to_owned()));

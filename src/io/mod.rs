@@ -35,7 +35,9 @@ mod text;
 mod transforms;
 
 pub use error::{ReadError, WriteError};
-pub use exr::{ExrCompression, ExrOptions, PixelType, write_exr};
+pub use exr::{
+    Channel, ChannelValues, ExrCompression, ExrOptions, PixelType, Row, write_channels, write_exr,
+};
 pub use exr_read::read_exr;
 pub use grid::{SampleLayout, SampleType, read_npy, read_raw};
 pub use image::{ColorSpace, ImageFile, read_image};

@@ -15,9 +15,16 @@ use super::error::WriteError;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attribute {
     /// Its name, at most 31 characters (older readers refuse longer ones): "alhazen.seed".
-    pub name: &'static str,
+    pub name: String,
     /// Its value.
     pub value: AttributeValue,
+}
+
+impl Attribute {
+    /// An attribute of this name.
+    pub fn new(name: impl Into<String>, value: AttributeValue) -> Self {
+        Self { name: name.into(), value }
+    }
 }
 
 /// The kinds of attributes.
