@@ -6,7 +6,9 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 
-use super::units::{parse_bytes, parse_count, parse_crop, parse_share, parse_size, parse_time};
+use super::units::{
+    Part, parse_bytes, parse_count, parse_crop, parse_part, parse_share, parse_size, parse_time,
+};
 use crate::accel::{AccelKind, BuildQuality, Precision};
 use crate::film::{Filter, PixelRect};
 use crate::geometry::generate::GeneratedKind;
@@ -25,6 +27,7 @@ Start here:
   alhazen render bunny.ply                    any mesh: framed and lit by itself, to bunny.exr
   alhazen render scene.toml -o out.exr -o out.png
   alhazen render scene.toml --size 640x360 --samples 4 --set camera.fov=30
+  alhazen render scene.toml --checkpoint 60s  may be interrupted: --resume goes on
   alhazen inspect scene.toml                  what it holds, what it requires, what it costs
   alhazen compare out.exr reference.exr       how far a picture is from a reference
   alhazen bench bunny.ply --html bench.html   how fast and how right accelerators are on it
@@ -43,6 +46,8 @@ pub(super) struct Args {
 pub(super) enum Command {
     /// Render a scene (.toml) or a bare mesh (.ply, .obj, .stl) to EXR or PNG
     Render(RenderArgs),
+    /// Join the parts of a picture that were rendered with --part, to the same picture as in one piece
+    Merge(MergeArgs),
     /// Say what a scene holds, what it requires of the renderer, and what it costs to build
     Inspect(InspectArgs),
     /// Say how far a picture is from a reference (EXR or PNG): MSE, relMSE, PSNR, FLIP
@@ -162,6 +167,53 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     pub(super) time: Option<Duration>,
 
+    /// Keeps how far the render is, about this often and when it is interrupted, beside the first output
+    /// file (NAME.checkpoint.exr); removed once that is written
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    pub(super) checkpoint: Option<Duration>,
+
+    /// Goes on from that file, to the same picture as without a pause; from the start where there is none.
+    /// Keeps on writing it, every 60 s where --checkpoint does not say otherwise
+    #[arg(long)]
+    pub(super) resume: bool,
+
+    /// Takes only part K of the samples, of N, for `alhazen merge`: 1/8 to 8/8. The file is a picture too
+    #[arg(long, value_name = "K/N", value_parser = parse_part, conflicts_with_all = ["error", "time"])]
+    pub(super) part: Option<Part>,
+
+    #[command(flatten)]
+    pub(super) format: FormatArgs,
+
+    /// Write times, rays, memory and error as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) stats: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+pub(super) struct MergeArgs {
+    /// The parts, in any order
+    #[arg(required = true, value_name = "PART.exr")]
+    pub(super) parts: Vec<PathBuf>,
+
+    /// File to write, .exr or .png; repeatable
+    #[arg(long, short, value_name = "FILE", required = true)]
+    pub(super) output: Vec<PathBuf>,
+
+    #[command(flatten)]
+    pub(super) format: FormatArgs,
+
+    /// Threads; all of the machine's where not given
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    pub(super) threads: Option<u16>,
+
+    /// No closing table: only errors and warnings
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+/// How pictures are written.
+#[derive(Debug, clap::Args)]
+pub(super) struct FormatArgs {
     /// Exposure of PNG files, in stops: 1 doubles the light
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(super) exposure: f32,
@@ -175,10 +227,6 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "NAME", default_value = "zip",
           value_parser = by_name(&ExrCompression::ALL, ExrCompression::name))]
     pub(super) exr_compression: ExrCompression,
-
-    /// Write times, rays, memory and error as JSON
-    #[arg(long, value_name = "FILE.json")]
-    pub(super) stats: Option<PathBuf>,
 }
 
 #[derive(Debug, clap::Args)]

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::args::BenchArgs;
 use super::progress::{Progress, catch_interrupts};
 use super::units::grouped;
-use super::{Failure, Outcome, job, print};
+use super::{Failure, Outcome, job, outputs, print};
 use crate::accel::AccelKind;
 use crate::measure::bench::{
     Agreement, BenchError, BenchOptions, BenchReport, RayKind, Row, StructureKind,
@@ -26,7 +26,7 @@ struct Report<'a> {
 /// Measures, prints, writes what was asked for.
 pub(super) fn bench(args: &BenchArgs) -> Result<Outcome, Failure> {
     let scene_args = &args.scene;
-    job::check_targets(&scene_args.scene, args.json.iter().chain(&args.html))?;
+    outputs::check_targets([scene_args.scene.as_path()], args.json.iter().chain(&args.html))?;
     catch_interrupts();
     let pool = job::thread_pool(scene_args.threads)?;
     let loaded = pool.install(|| job::load(scene_args))?;

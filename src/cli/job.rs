@@ -1,22 +1,26 @@
 //! What the flags of `render` mean together: conflicts found before any work, then load, build,
 //! render, write.
 
-use std::path::{Path, PathBuf};
+use std::ops::Range;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
 use super::args::{RenderArgs, SceneArgs};
+use super::keep::{
+    CHECKPOINT_EVERY, Keeper, Watch, checkpoint_path, part_attributes, part_range,
+    resuming_command, write_end,
+};
+use super::outputs::{Output, check_format, check_targets, write_all};
 use super::progress::{Progress, catch_interrupts, interrupted};
+use super::units::Part;
 use super::{Failure, Outcome, print, report, tell};
 use crate::accel::{AccelError, AccelKind, BuildOptions, Compact};
 use crate::film::PixelRect;
-use crate::io::{
-    ExrOptions, LoadOptions, LoadedScene, PixelType, WriteError, available_memory, check_writable,
-    load_scene, write_exr, write_png,
-};
-use crate::render::{RenderJob, Rendered, Stop, StopRules, render as run_render};
-use crate::scene::{Scene, SceneError};
+use crate::io::{LoadOptions, LoadedScene, available_memory, load_scene};
+use crate::render::{RenderJob, Rendered, Stop, StopRules, resume};
+use crate::scene::{RenderSettings, Scene, SceneError};
 
 /// Samples at which a render ends that was to reach an error or a time.
 const MOST_SAMPLES: u32 = 1 << 24;
@@ -31,25 +35,15 @@ pub(super) struct Phases {
     pub(super) total: f64,
 }
 
-/// A file to write.
-struct Output {
-    path: PathBuf,
-    format: Format,
-}
-
-enum Format {
-    Exr,
-    Png,
-}
-
 /// `alhazen render`.
 pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failure> {
     let quiet = args.scene.quiet;
     let outputs = outputs(args)?;
-    if !args.exposure.is_finite() {
-        return Err(Failure::BadInput("--exposure must be a finite number".to_owned()));
-    }
-    check_targets(&args.scene.scene, outputs.iter().map(|o| &o.path).chain(&args.stats))?;
+    check_format(&args.format)?;
+    let checkpoint =
+        (args.checkpoint.is_some() || args.resume).then(|| checkpoint_path(&outputs[0].path));
+    let targets = outputs.iter().map(|o| &o.path).chain(&args.stats).chain(&checkpoint);
+    check_targets([args.scene.scene.as_path()], targets)?;
     catch_interrupts();
     let mut phases = Phases::default();
     let clock = Instant::now();
@@ -58,53 +52,86 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     phases.read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
     let size = loaded.scene.image.size;
+    let samples = loaded.scene.settings.samples;
     let crop = args.crop.map(|crop| check_crop(crop, size)).transpose()?;
-    let goes_on = args.error.is_some() || args.time.is_some();
-    let film = film_bytes(&crop.unwrap_or(PixelRect::whole(size)), goes_on);
+    let window = crop.unwrap_or(PixelRect::whole(size));
+    let part = args.part.map(|part| Ok((part, check_part(part, samples)?))).transpose()?;
+    let is_kept =
+        args.error.is_some() || args.time.is_some() || checkpoint.is_some() || part.is_some();
+    let film = film_bytes(&window, is_kept);
     check_memory(size, film)?;
 
     let clock = Instant::now();
     let scene = pool.install(|| build(&args.scene, args.accel.kind, loaded, film))?;
     phases.build = clock.elapsed().as_secs_f64();
 
+    let every = args.checkpoint.unwrap_or(CHECKPOINT_EVERY);
+    let stop = match &part {
+        Some((_, range)) => Some(StopRules { samples: range.end, error: None, deadline: None }),
+        None => stop_rules(args, start, &window),
+    };
     let job = RenderJob {
         crop,
         seed: args.seed,
         variant: None,
-        stop: stop_rules(args, start, &crop.unwrap_or(PixelRect::whole(size))),
+        stop,
+        first_sample: part.as_ref().map_or(0, |(_, range)| range.start),
+        keep_state: is_kept,
+        pass_time: checkpoint.as_ref().map(|_| every),
     };
+    let mut identity = report::identity(&scene, hash, args.seed);
+    if let Some((part, _)) = part {
+        identity.extend(part_attributes(part, samples));
+    }
+    let keeper = checkpoint.map(|path| Keeper::new(path, every, identity.clone()));
+    let state = match keeper.as_ref().filter(|_| args.resume) {
+        Some(keeper) => pool.install(|| keeper.read(job.first_sample, window, size))?,
+        None => None,
+    };
+    if let Some(state) = state.as_ref().filter(|_| !quiet) {
+        let samples = state.samples().len();
+        print(&format!("{:>10}  from {samples} samples of every pixel", "goes on"));
+    }
     let clock = Instant::now();
-    let progress = Progress::new(quiet, "render");
-    let rendered = pool.install(|| run_render(&scene, &job, &progress));
-    progress.finish();
+    let watch = Watch { progress: Progress::new(quiet, "render"), keeper };
+    let mut rendered = pool.install(|| resume(&scene, &job, state, &watch));
+    watch.progress.finish();
     phases.render = clock.elapsed().as_secs_f64();
 
     let clock = Instant::now();
-    let accel = scene.accel.info();
-    let attributes = report::attributes(&scene, hash, &job, &rendered, &accel);
-    for output in &outputs {
-        let path = &output.path;
-        let failed = |e: WriteError| Failure::Failed(e.to_string());
-        match output.format {
-            Format::Exr => {
-                let options =
-                    ExrOptions { pixel_type: args.exr_type, compression: args.exr_compression };
-                let used = pool
-                    .install(|| write_exr(path, &rendered.film, &attributes, &options))
-                    .map_err(failed)?;
-                if used != args.exr_type && !quiet {
-                    warn(&format!(
-                        "{}: written as {}, as half ends at 65504",
-                        path.display(),
-                        PixelType::Float.name()
-                    ));
-                }
-            }
-            Format::Png => write_png(path, &rendered.film, args.exposure).map_err(failed)?,
+    let is_interrupted = rendered.stop == Stop::Interrupted;
+    if let Some(keeper) = watch.keeper.as_ref().filter(|_| is_interrupted) {
+        // The picture is written all the same.
+        match pool.install(|| keeper.keep_end(&rendered)) {
+            Ok(()) => tell(&format!("to go on: {}", resuming_command())),
+            Err(error) => warn(&format!("no checkpoint: {error}")),
         }
     }
+    let state = rendered.state.take();
+    let accel = scene.accel.info();
+    let written = match (part, state) {
+        (Some(_), Some(state)) => {
+            let attributes = identity;
+            let path = &outputs[0].path;
+            let written = pool.install(|| write_end(path, &rendered, &state, attributes));
+            written.map_err(|e| Failure::Failed(e.to_string())).map(|()| {
+                if !quiet {
+                    print(&format!("{:>10}  {}", "wrote", path.display()));
+                }
+            })
+        }
+        _ => {
+            let mut attributes = identity;
+            attributes.extend(report::outcome(&rendered.film, rendered.samples, rendered.stop));
+            pool.install(|| write_all(&outputs, &rendered.film, &attributes, &args.format, quiet))
+        }
+    };
     phases.write = clock.elapsed().as_secs_f64();
     phases.total = start.elapsed().as_secs_f64();
+    written?;
+    if let Some(keeper) = watch.keeper.as_ref().filter(|_| !is_interrupted) {
+        keeper.remove();
+    }
 
     if let Some(path) = &args.stats {
         report::write_stats(path, &phases, &rendered, &accel)?;
@@ -112,11 +139,8 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     if !quiet {
         tell_non_finite(&rendered);
         report::print_table(&phases, &rendered, &accel);
-        for output in &outputs {
-            print(&format!("{:>10}  {}", "wrote", output.path.display()));
-        }
     }
-    if rendered.stop == Stop::Interrupted {
+    if is_interrupted {
         tell("interrupted; the picture holds what was finished, the rest is black");
         return Ok(Outcome::Interrupted);
     }
@@ -148,33 +172,11 @@ pub(super) fn load(args: &SceneArgs) -> Result<LoadedScene, Failure> {
         settings.compact = Compact::On;
     }
     // Flags and fields that say the same are the same scene.
-    let said = format!("{:016x} {:?} {:?}", loaded.hash, scene.image, scene.settings);
+    // More samples go on with the same picture.
+    let settings = RenderSettings { samples: 0, ..scene.settings.clone() };
+    let said = format!("{:016x} {:?} {settings:?}", loaded.hash, scene.image);
     loaded.hash = xxhash_rust::xxh3::xxh3_64(said.as_bytes());
     Ok(loaded)
-}
-
-/// Finds out before any work that every file could be written, and that none is written twice or over
-/// the scene.
-pub(super) fn check_targets<'a>(
-    scene: &Path,
-    targets: impl Iterator<Item = &'a PathBuf>,
-) -> Result<(), Failure> {
-    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let mut taken = vec![real(scene)];
-    for path in targets {
-        check_writable(path).map_err(|e| Failure::BadInput(e.to_string()))?;
-        // A file that is not there yet is told by its folder.
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let place = path
-            .canonicalize()
-            .unwrap_or_else(|_| real(folder).join(path.file_name().unwrap_or_default()));
-        if taken.contains(&place) {
-            let message = format!("{}: would be written twice, or over the scene", path.display());
-            return Err(Failure::BadInput(message));
-        }
-        taken.push(place);
-    }
-    Ok(())
 }
 
 /// Bytes that a picture takes: mean and error of a pixel, and what the encoders need beside them; with the
@@ -269,28 +271,31 @@ pub(super) fn thread_pool(threads: Option<u16>) -> Result<rayon::ThreadPool, Fai
 }
 
 fn outputs(args: &RenderArgs) -> Result<Vec<Output>, Failure> {
-    let paths = if args.output.is_empty() {
+    let mut outputs: Vec<Output> =
+        args.output.iter().cloned().map(Output::new).collect::<Result<_, _>>()?;
+    if outputs.is_empty() {
         let mut name =
             args.scene.scene.file_stem().unwrap_or_else(|| "picture".as_ref()).to_owned();
+        if let Some(Part { number, count }) = args.part {
+            name.push(format!(".part{number}of{count}"));
+        }
         name.push(".exr");
-        vec![PathBuf::from(name)]
-    } else {
-        args.output.clone()
-    };
-    let output = |path: PathBuf| {
-        let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        let format = match extension.as_str() {
-            "exr" => Format::Exr,
-            "png" => Format::Png,
-            _ => {
-                let message =
-                    format!("{}: unknown kind of picture; accepted: .exr, .png", path.display());
-                return Err(Failure::BadInput(message));
-            }
-        };
-        Ok(Output { path, format })
-    };
-    paths.into_iter().map(output).collect()
+        outputs.push(Output::new(PathBuf::from(name))?);
+    }
+    if args.part.is_some() && (outputs.len() > 1 || !outputs[0].is_exr()) {
+        let message = "--part writes a single .exr file; pictures of other kinds are for `merge`";
+        return Err(Failure::BadInput(message.to_owned()));
+    }
+    Ok(outputs)
+}
+
+fn check_part(part: Part, samples: u32) -> Result<Range<u32>, Failure> {
+    part_range(part, samples).ok_or_else(|| {
+        let Part { number, count } = part;
+        Failure::BadInput(format!(
+            "--part {number}/{count}: {samples} samples make at most {samples} parts"
+        ))
+    })
 }
 
 fn check_crop(crop: PixelRect, size: [u32; 2]) -> Result<PixelRect, Failure> {

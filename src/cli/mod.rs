@@ -10,6 +10,9 @@ mod compare;
 mod generate;
 mod inspect;
 mod job;
+mod keep;
+mod merge;
+mod outputs;
 mod progress;
 mod report;
 mod units;
@@ -77,6 +80,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     };
     let result = match args.command {
         Command::Render(args) => job::render(&args, start),
+        Command::Merge(args) => merge::merge(&args, start),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Bench(args) => bench::bench(&args),

@@ -7,8 +7,9 @@ use serde::Serialize;
 use super::units::{grouped, megabytes};
 use super::{Failure, job::Phases, print};
 use crate::accel::AccelInfo;
+use crate::film::Film;
 use crate::io::{Attribute, AttributeValue};
-use crate::render::{RenderJob, Rendered, Stop};
+use crate::render::{Rendered, Stop};
 use crate::scene::{Epsilon, IntegratorKind, Scene};
 
 /// The fields of `--stats`; their names are stable.
@@ -155,38 +156,39 @@ fn plural(n: u32, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }
 
-/// What the header of an EXR says of how the picture was made. Nothing that changes from run to run.
-pub(super) fn attributes(
-    scene: &Scene,
-    scene_hash: u64,
-    job: &RenderJob,
-    rendered: &Rendered,
-    accel: &AccelInfo,
-) -> Vec<Attribute> {
+/// What the header of an EXR says of how the picture is made: renders of which all this is equal can be
+/// joined. Nothing that changes from run to run.
+pub(super) fn identity(scene: &Scene, scene_hash: u64, seed: u64) -> Vec<Attribute> {
     let text = |name, value| Attribute::new(name, AttributeValue::Text(value));
-    let integer = |name, value: u32| {
-        Attribute::new(name, AttributeValue::Integer(i32::try_from(value).unwrap_or(i32::MAX)))
-    };
     let settings = &scene.settings;
-    let mut list = vec![
+    let accel = scene.accel.info();
+    vec![
         text("alhazen.version", env!("CARGO_PKG_VERSION").to_owned()),
         text("alhazen.scene", format!("{scene_hash:016x}")),
-        text("alhazen.seed", job.seed.to_string()),
-        integer("alhazen.samples", rendered.samples),
+        text("alhazen.seed", seed.to_string()),
         text("alhazen.integrator", settings.integrator.name().to_owned()),
         text("alhazen.filter", settings.filter.name().to_owned()),
         text("alhazen.precision", settings.precision.name().to_owned()),
         text("alhazen.accel", accel.name.clone()),
         text("alhazen.isa", accel.isa.to_owned()),
-        integer("alhazen.packetWidth", accel.packet_width as u32),
+        Attribute::new(
+            "alhazen.packetWidth",
+            AttributeValue::Integer(i32::try_from(accel.packet_width).unwrap_or(i32::MAX)),
+        ),
         text("alhazen.bias", biasing_options(scene)),
         Attribute::new("alhazen.origin", AttributeValue::Vector(scene.center.as_vec3().to_array())),
-    ];
-    if let Some(error) = rendered.film.relative_error() {
+    ]
+}
+
+/// What it says of what came of it.
+pub(super) fn outcome(film: &Film, samples: u32, stop: Stop) -> Vec<Attribute> {
+    let samples = i32::try_from(samples).unwrap_or(i32::MAX);
+    let mut list = vec![Attribute::new("alhazen.samples", AttributeValue::Integer(samples))];
+    if let Some(error) = film.relative_error() {
         list.push(Attribute::new("alhazen.error", AttributeValue::Float(error)));
     }
-    if rendered.stop != Stop::Samples {
-        list.push(text("alhazen.stop", rendered.stop.name().to_owned()));
+    if stop != Stop::Samples {
+        list.push(Attribute::new("alhazen.stop", AttributeValue::Text(stop.name().to_owned())));
     }
     list
 }

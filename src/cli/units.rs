@@ -22,6 +22,26 @@ pub(super) fn parse_crop(text: &str) -> Result<PixelRect, String> {
     }
 }
 
+/// One of several parts of the samples of a render.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Part {
+    /// Which, from 1.
+    pub(super) number: u32,
+    /// Of how many.
+    pub(super) count: u32,
+}
+
+/// "3/8".
+pub(super) fn parse_part(text: &str) -> Result<Part, String> {
+    let numbers = text.split_once('/').map(|(k, n)| (k.trim().parse(), n.trim().parse()));
+    match numbers {
+        Some((Ok(number), Ok(count))) if (1..=count).contains(&number) => {
+            Ok(Part { number, count })
+        }
+        _ => Err("expected K/N with K from 1 to N, as in 3/8".to_owned()),
+    }
+}
+
 /// "512M", "8G", "1.5GiB": powers of 1024.
 pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
     let text = text.trim();

@@ -9,21 +9,25 @@
 //! samples is not even kept: samples of one Owen-scrambled set are not independent, and it would
 //! overstate the error 3 to 50 times.
 
+use std::ops::Range;
+
 use crate::color::Rgb;
 
 /// Pixels of a block: 4 × 4, in rows.
 pub const BLOCK_LANES: usize = 16;
 
 /// A node of the tree: for every pixel of a block the number of samples that counted, and their sum.
-#[derive(Debug, Clone, Copy)]
-struct Node {
-    count: [u32; BLOCK_LANES],
-    /// By channel.
-    sum: [[f64; BLOCK_LANES]; 3],
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SumNode {
+    /// Samples that counted: all but those that were not finite or outside the picture.
+    pub count: [u32; BLOCK_LANES],
+    /// Their sum, by channel.
+    pub sum: [[f64; BLOCK_LANES]; 3],
 }
 
-impl Node {
-    const EMPTY: Self = Self { count: [0; BLOCK_LANES], sum: [[0.0; BLOCK_LANES]; 3] };
+impl SumNode {
+    /// Of no samples.
+    pub const EMPTY: Self = Self { count: [0; BLOCK_LANES], sum: [[0.0; BLOCK_LANES]; 3] };
 
     fn join(&mut self, later: &Self) {
         for lane in 0..BLOCK_LANES {
@@ -39,34 +43,44 @@ impl Node {
 #[derive(Debug, Default)]
 struct Replicate {
     /// (level, node): a node of level l covers 2^l samples.
-    nodes: Vec<(u32, Node)>,
+    nodes: Vec<(u32, SumNode)>,
     /// One past the last sample's index within the replicate.
     end: u32,
 }
 
 impl Replicate {
-    /// Adds the next leaf, which `fill` writes; then every pair that it completes becomes one node.
-    fn push(&mut self, fill: impl FnOnce(&mut Node)) {
-        self.nodes.push((0, Node::EMPTY));
+    /// Adds the next leaf, which `fill` writes.
+    fn push(&mut self, fill: impl FnOnce(&mut SumNode)) {
+        self.nodes.push((0, SumNode::EMPTY));
         if let Some((_, leaf)) = self.nodes.last_mut() {
             fill(leaf);
         }
-        let mut position = self.end;
         self.end += 1;
-        // A node's position on its level is odd where it completes a pair.
+        self.join_pairs();
+    }
+
+    /// Adds a node that begins where the last one ends.
+    fn append(&mut self, level: u32, node: SumNode) {
+        self.nodes.push((level, node));
+        self.end += 1 << level;
+        self.join_pairs();
+    }
+
+    /// Makes every pair that the last node completes one node.
+    fn join_pairs(&mut self) {
         while let [.., (left_level, left), (level, node)] = self.nodes.as_mut_slice()
             && *left_level == *level
-            && position & 1 == 1
+            // A node's position on its level is odd where it completes a pair.
+            && ((self.end >> *level) - 1) & 1 == 1
         {
             left.join(node);
             *left_level += 1;
-            position >>= 1;
             self.nodes.pop();
         }
     }
 
     /// The sum of all nodes, joined from the last backwards; none where there is none.
-    fn total(&self) -> Option<Node> {
+    fn total(&self) -> Option<SumNode> {
         let mut nodes = self.nodes.iter().rev().map(|(_, node)| node);
         let mut total = *nodes.next()?;
         for earlier in nodes {
@@ -80,31 +94,33 @@ impl Replicate {
 /// Adds up the samples of one block of 4 × 4 pixels. Reusable, so that a thread allocates once.
 #[derive(Debug)]
 pub struct BlockAccumulator {
+    /// Number of the first sample.
+    first: u32,
     replicates: Vec<Replicate>,
     /// Sums of the replicates that have any samples, while a block is finished.
-    totals: Vec<Node>,
+    totals: Vec<SumNode>,
 }
 
 impl BlockAccumulator {
     /// For samples of which number i belongs to replicate i mod `replicates`.
     pub fn new(replicates: u32) -> Self {
         let replicates = (0..replicates).map(|_| Replicate::default()).collect();
-        Self { replicates, totals: Vec::new() }
+        Self { first: 0, replicates, totals: Vec::new() }
     }
 
     /// Forgets everything; the next sample is number `first_sample`.
     pub fn restart(&mut self, first_sample: u32) {
         let replicates = self.replicates.len() as u32;
+        self.first = first_sample;
         for (r, replicate) in (0u32..).zip(&mut self.replicates) {
             replicate.nodes.clear();
-            // Samples of this replicate below `first_sample`.
-            replicate.end = first_sample / replicates + u32::from(r < first_sample % replicates);
+            replicate.end = samples_below(first_sample, r, replicates);
         }
     }
 
-    /// Stores what was added so far, for [`BlockAccumulator::resume`]. It must begin with sample 0.
+    /// Stores what was added so far, for [`BlockAccumulator::resume`].
     pub fn store(&self, sums: &mut BlockSums) {
-        sums.samples = self.replicates.iter().map(|replicate| replicate.end).sum();
+        sums.samples = self.first..self.replicates.iter().map(|replicate| replicate.end).sum();
         sums.nodes.clear();
         sums.nodes.reserve_exact(self.replicates.iter().map(|r| r.nodes.len()).sum());
         for replicate in &self.replicates {
@@ -114,13 +130,25 @@ impl BlockAccumulator {
 
     /// Goes on from what was stored of as many replicates.
     pub fn resume(&mut self, sums: &BlockSums) {
-        self.restart(sums.samples);
-        let mut nodes = sums.nodes.iter();
-        for replicate in &mut self.replicates {
-            // Of the samples from 0 on: a node for each bit of their number, the largest first.
-            let levels = (0..u32::BITS).rev().filter(|level| replicate.end >> level & 1 == 1);
-            replicate.nodes.extend(levels.zip(&mut nodes).map(|(level, node)| (level, *node)));
+        self.restart(sums.samples.start);
+        self.append(sums);
+    }
+
+    /// Adds the sums of the samples that follow the last one, of as many replicates. False, and nothing is
+    /// added, where they begin elsewhere.
+    pub fn append(&mut self, sums: &BlockSums) -> bool {
+        let end: u32 = self.replicates.iter().map(|replicate| replicate.end).sum();
+        if sums.samples.start != end {
+            return false;
         }
+        let replicates = self.replicates.len() as u32;
+        let mut nodes = sums.nodes.iter();
+        for (r, replicate) in (0u32..).zip(&mut self.replicates) {
+            for (level, node) in levels(&sums.samples, r, replicates).zip(&mut nodes) {
+                replicate.append(level, *node);
+            }
+        }
+        true
     }
 
     /// Adds sample `index` of all pixels, which must follow the one before it.
@@ -197,13 +225,59 @@ impl BlockAccumulator {
     }
 }
 
-/// The sums of the samples of a block from the first on, to be gone on from.
-#[derive(Debug, Clone, Default)]
+/// Samples of replicate `r` among those with numbers below `sample`.
+const fn samples_below(sample: u32, r: u32, replicates: u32) -> u32 {
+    sample / replicates + (r < sample % replicates) as u32
+}
+
+/// The levels of the nodes that the samples of replicate `r` in a range make, earliest first: from where
+/// the range begins, each time the largest node that begins there and ends within it.
+fn levels(samples: &Range<u32>, r: u32, replicates: u32) -> impl Iterator<Item = u32> + use<> {
+    let end = samples_below(samples.end, r, replicates);
+    let mut at = samples_below(samples.start, r, replicates);
+    std::iter::from_fn(move || {
+        let level = at.trailing_zeros().min(end.checked_sub(at)?.checked_ilog2()?);
+        at += 1 << level;
+        Some(level)
+    })
+}
+
+/// The sums of a contiguous range of the samples of a block, to be gone on from or joined with others.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct BlockSums {
-    /// How many samples.
-    samples: u32,
-    /// Of each replicate, the largest first.
-    nodes: Vec<Node>,
+    samples: Range<u32>,
+    /// Of each replicate, earliest first.
+    nodes: Vec<SumNode>,
+}
+
+impl BlockSums {
+    /// Of no samples; the first to come is number `first`.
+    pub const fn starting_at(first: u32) -> Self {
+        Self { samples: first..first, nodes: Vec::new() }
+    }
+
+    /// From the nodes of the range: those of each replicate in turn, as many as
+    /// [`BlockSums::nodes_of_replicate`] says. None where their number is another.
+    pub fn from_nodes(samples: Range<u32>, replicates: u32, nodes: Vec<SumNode>) -> Option<Self> {
+        let expected: usize =
+            (0..replicates).map(|r| Self::nodes_of_replicate(&samples, r, replicates)).sum();
+        (samples.start <= samples.end && nodes.len() == expected).then_some(Self { samples, nodes })
+    }
+
+    /// How many nodes the samples of replicate `r` in a range make.
+    pub fn nodes_of_replicate(samples: &Range<u32>, r: u32, replicates: u32) -> usize {
+        levels(samples, r, replicates).count()
+    }
+
+    /// The samples that are summed.
+    pub const fn samples(&self) -> &Range<u32> {
+        &self.samples
+    }
+
+    /// The nodes of each replicate in turn, earliest first.
+    pub fn nodes(&self) -> &[SumNode] {
+        &self.nodes
+    }
 }
 
 /// The finished pixels of a block.
@@ -304,10 +378,36 @@ mod tests {
                 parts.store(&mut stored);
                 parts.restart(5);
                 parts.resume(&stored);
+                let (samples, nodes) = (stored.samples().clone(), stored.nodes().to_vec());
+                assert_eq!(BlockSums::from_nodes(samples, 4, nodes), Some(stored.clone()));
             }
         }
         let (a, b) = (whole.finish([0, 0]), parts.finish([0, 0]));
         assert_eq!((a.mean, a.standard_error), (b.mean, b.standard_error));
+    }
+
+    #[test]
+    fn parts_join_to_the_same_bits() {
+        let value = |i: u32| [Rgb::new((i as f32).sin(), 1.0 / (i + 1) as f32, 0.1); BLOCK_LANES];
+        let sums = |range: Range<u32>| {
+            let mut block = BlockAccumulator::new(4);
+            block.restart(range.start);
+            range.for_each(|i| assert_eq!(block.add(i, u16::MAX, &value(i)), 0));
+            let mut sums = BlockSums::default();
+            block.store(&mut sums);
+            sums
+        };
+        let whole = sums(0..211);
+        for cuts in [[0, 1, 2, 211], [0, 50, 100, 211], [0, 64, 128, 211], [0, 5, 205, 211]] {
+            let mut joined = BlockAccumulator::new(4);
+            joined.restart(0);
+            let parts: Vec<_> = cuts.windows(2).map(|cut| sums(cut[0]..cut[1])).collect();
+            assert!(!joined.append(&parts[1]), "not in order");
+            assert!(parts.iter().all(|part| joined.append(part)));
+            let mut stored = BlockSums::default();
+            joined.store(&mut stored);
+            assert_eq!(stored, whole, "{cuts:?}");
+        }
     }
 
     #[test]

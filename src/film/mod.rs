@@ -5,7 +5,7 @@ mod accumulate;
 mod filter;
 mod picture;
 
-pub use accumulate::{BLOCK_LANES, BlockAccumulator, BlockPixels, BlockSums};
+pub use accumulate::{BLOCK_LANES, BlockAccumulator, BlockPixels, BlockSums, SumNode};
 pub use filter::{Filter, FilterSample, FilterTable};
 pub use picture::Picture;
 

@@ -1,4 +1,4 @@
-//! Reading OpenEXR: the colours of one layer, as linear light.
+//! Reading OpenEXR: the colours of one layer as linear light, or all channels as they are.
 //!
 //! Headers and compressions are the `exr` crate's; finding the blocks in the file is ours, so that
 //! nothing is allocated for what a file merely claims, other layers cost nothing, and several threads
@@ -13,12 +13,14 @@ use exr::block::UncompressedBlock;
 use exr::block::chunk::{
     Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates,
 };
+use exr::meta::attribute::AttributeValue as ExrValue;
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::{Compression, SampleType, Vec2, f16};
 use rayon::prelude::*;
 
 use super::error::ReadError;
+use super::output::{Attribute, AttributeValue};
 use super::picture::check_size;
 use super::source::Source;
 use crate::color::Rgb;
@@ -52,55 +54,176 @@ fn unsound(path: &Path, detail: impl std::fmt::Display) -> ReadError {
 }
 
 fn decode_layer(path: &Path, bytes: &[u8]) -> Result<Picture, ReadError> {
-    let bad = |error: exr::error::Error| match error {
-        exr::error::Error::Io(_) => unsound(path, "it ends too early"),
-        other => unsound(path, other),
-    };
-    let mut cursor = Cursor::new(bytes);
-    let meta = MetaData::read_from_buffered(&mut cursor, false).map_err(bad)?;
-    let tables = cursor.position();
-    let (part, channels) = find_colours(path, &meta.headers)?;
-    let header = &meta.headers[part];
-    header.validate(meta.headers.len() > 1, &mut false, false).map_err(bad)?;
-    let (extent, count) = check_header(path, header, bytes.len())?;
-
-    // Where the blocks of each part begin: eight bytes each, part by part.
-    let blocks_before = |n: usize| meta.headers[..n].iter().map(|h| h.chunk_count as u128).sum();
-    let [from, to] = [part, part + 1].map(blocks_before).map(|n: u128| u128::from(tables) + 8 * n);
-    let table = match (usize::try_from(from), usize::try_from(to)) {
-        (Ok(from), Ok(to)) => bytes.get(from..to),
-        _ => None,
-    };
-    let table = table.ok_or_else(|| unsound(path, "it ends too early"))?;
-
-    let mut pixels = Vec::new();
-    let reserved = pixels.try_reserve_exact(count);
-    reserved.map_err(|_| ReadError::file(path, "the picture does not fit into memory"))?;
-    pixels.resize(count, Rgb::BLACK);
-    let mut placed = Placed { seen: HashSet::new(), pixels: 0 };
-    for offsets in table.chunks(8 * BATCH) {
-        let blocks: Vec<Option<UncompressedBlock>> = offsets
-            .par_chunks_exact(8)
-            .map(|offset| {
-                let offset = offset.try_into().map_or(u64::MAX, u64::from_le_bytes);
-                let chunk = find_block(path, bytes, offset, &meta, part)?;
-                let decode = |c| UncompressedBlock::decompress_chunk(c, &meta, false).map_err(bad);
-                chunk.map(decode).transpose()
-            })
-            .collect::<Result<_, _>>()?;
-        for block in blocks.into_iter().flatten() {
-            let put = placed.put(&block, header, &channels, extent, &mut pixels);
-            put.ok_or_else(|| unsound(path, "a block is not where or what it should be"))?;
+    let parts = Parts::read(path, bytes)?;
+    let (part, channels) = find_colours(path, &parts.meta.headers)?;
+    let (extent, count) = parts.check(part)?;
+    let mut pixels = reserve(path, count, Rgb::BLACK)?;
+    parts.decode(part, &channels, |first, k, kind, values| {
+        let size = kind.bytes_per_sample();
+        let row = &mut pixels[first..first + values.len() / size];
+        for (pixel, value) in row.iter_mut().zip(values.chunks_exact(size)) {
+            *[&mut pixel.r, &mut pixel.g, &mut pixel.b][k] = sample(kind, value);
         }
+    })?;
+    let (size, origin) = windows(&parts.meta.headers[part]);
+    Ok(Picture { size, extent, origin: Some(origin), pixels })
+}
+
+/// All channels of the only part of a file.
+pub(super) struct ExrChannels {
+    /// Size of the whole picture.
+    pub(super) size: [u32; 2],
+    /// The pixels that it holds, across and down.
+    pub(super) extent: [u32; 2],
+    /// Where the first of them lies in the whole.
+    pub(super) origin: [i32; 2],
+    /// What else the header says, by name.
+    pub(super) attributes: Vec<Attribute>,
+    /// Names and bits of channels of 32 bits a pixel, row by row; others are left out.
+    pub(super) channels: Vec<(String, Vec<u32>)>,
+}
+
+/// Reads all channels of 32 bits of an EXR file.
+///
+/// # Errors
+/// [`ReadError`] where the file cannot be read, is not a sound EXR file, or has several parts.
+pub(super) fn read_channels(path: &Path) -> Result<ExrChannels, ReadError> {
+    let bytes = Source::open(path)?.read_from(0)?;
+    if !bytes.starts_with(&SIGNATURE) {
+        return Err(ReadError::file(path, "not an EXR file"));
     }
-    if placed.pixels != count {
-        return Err(unsound(path, "blocks are missing"));
+    let decoded = catch_unwind(AssertUnwindSafe(|| decode_channels(path, &bytes)));
+    decoded.unwrap_or_else(|_| Err(unsound(path, "its blocks cannot be decoded")))
+}
+
+fn decode_channels(path: &Path, bytes: &[u8]) -> Result<ExrChannels, ReadError> {
+    let parts = Parts::read(path, bytes)?;
+    let [header] = parts.meta.headers.as_slice() else {
+        return Err(ReadError::file(path, "it has several parts; accepted: one"));
+    };
+    if header.deep {
+        return Err(ReadError::file(path, "it holds deep data; accepted: one value a pixel"));
     }
+    let (extent, count) = parts.check(0)?;
+    let is_wide = |kind: SampleType| kind.bytes_per_sample() == 4;
+    let list = header.channels.list.iter().enumerate();
+    let wanted: Vec<usize> = list.filter(|(_, c)| is_wide(c.sample_type)).map(|(i, _)| i).collect();
+    let mut channels = Vec::new();
+    for &index in &wanted {
+        let name = header.channels.list[index].name.to_string();
+        channels.push((name, reserve(path, count, 0u32)?));
+    }
+    parts.decode(0, &wanted, |first, k, _, values| {
+        let row = &mut channels[k].1[first..first + values.len() / 4];
+        for (to, value) in row.iter_mut().zip(values.as_chunks::<4>().0) {
+            *to = u32::from_ne_bytes(*value);
+        }
+    })?;
+    let attributes = header.own_attributes.other.iter().filter_map(|(name, value)| {
+        let value = match value {
+            ExrValue::Text(text) => AttributeValue::Text(text.to_string()),
+            ExrValue::I32(i) => AttributeValue::Integer(*i),
+            ExrValue::F64(x) => AttributeValue::Float(*x),
+            ExrValue::FloatVec3((x, y, z)) => AttributeValue::Vector([*x, *y, *z]),
+            _ => return None,
+        };
+        Some(Attribute::new(name.to_string(), value))
+    });
+    let mut attributes: Vec<Attribute> = attributes.collect();
+    attributes.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+    let (size, origin) = windows(header);
+    Ok(ExrChannels { size, extent, origin, attributes, channels })
+}
+
+/// The size of the whole picture, and where a part's first pixel lies in it.
+fn windows(header: &Header) -> ([u32; 2], [i32; 2]) {
     let whole = header.shared_attributes.display_window;
     let [data, display] = [header.own_attributes.layer_position, whole.position];
     let size = [whole.size.0, whole.size.1].map(|x| u32::try_from(x).unwrap_or(u32::MAX));
-    let origin = [data.0.saturating_sub(display.0), data.1.saturating_sub(display.1)];
-    Ok(Picture { size, extent, origin: Some(origin), pixels })
+    (size, [data.0.saturating_sub(display.0), data.1.saturating_sub(display.1)])
+}
+
+fn reserve<T: Clone>(path: &Path, count: usize, value: T) -> Result<Vec<T>, ReadError> {
+    let mut values = Vec::new();
+    let reserved = values.try_reserve_exact(count);
+    reserved.map_err(|_| ReadError::file(path, "the picture does not fit into memory"))?;
+    values.resize(count, value);
+    Ok(values)
+}
+
+/// A file whose headers are read.
+struct Parts<'a> {
+    path: &'a Path,
+    bytes: &'a [u8],
+    meta: MetaData,
+    /// Where the tables of blocks begin.
+    tables: u64,
+}
+
+impl<'a> Parts<'a> {
+    fn read(path: &'a Path, bytes: &'a [u8]) -> Result<Self, ReadError> {
+        let mut cursor = Cursor::new(bytes);
+        let meta = MetaData::read_from_buffered(&mut cursor, false).map_err(|e| bad(path, e))?;
+        Ok(Self { path, bytes, meta, tables: cursor.position() })
+    }
+
+    /// The pixels across and down of a part, and their number.
+    fn check(&self, part: usize) -> Result<([u32; 2], usize), ReadError> {
+        let headers = &self.meta.headers;
+        let checked = headers[part].validate(headers.len() > 1, &mut false, false);
+        checked.map_err(|e| bad(self.path, e))?;
+        check_header(self.path, &headers[part], self.bytes.len())
+    }
+
+    /// Hands the values of `channels` (by their number in the header) to `put`, line by line of each
+    /// block: the number of the first pixel, which of the channels, its type and the values' bytes. The
+    /// part must have been checked.
+    fn decode(
+        &self,
+        part: usize,
+        channels: &[usize],
+        mut put: impl FnMut(usize, usize, SampleType, &[u8]),
+    ) -> Result<(), ReadError> {
+        let (path, bytes, meta) = (self.path, self.bytes, &self.meta);
+        let header = &meta.headers[part];
+        let (extent, count) = check_header(path, header, bytes.len())?;
+        // Where the blocks of each part begin: eight bytes each, part by part.
+        let before = |n: usize| meta.headers[..n].iter().map(|h| h.chunk_count as u128).sum();
+        let [from, to] =
+            [part, part + 1].map(before).map(|n: u128| u128::from(self.tables) + 8 * n);
+        let table = match (usize::try_from(from), usize::try_from(to)) {
+            (Ok(from), Ok(to)) => bytes.get(from..to),
+            _ => None,
+        };
+        let table = table.ok_or_else(|| unsound(path, "it ends too early"))?;
+        let mut placed = Placed { seen: HashSet::new(), pixels: 0 };
+        for offsets in table.chunks(8 * BATCH) {
+            let blocks: Vec<Option<UncompressedBlock>> = offsets
+                .par_chunks_exact(8)
+                .map(|offset| {
+                    let offset = offset.try_into().map_or(u64::MAX, u64::from_le_bytes);
+                    let chunk = find_block(path, bytes, offset, meta, part)?;
+                    let decode = |c| UncompressedBlock::decompress_chunk(c, meta, false);
+                    chunk.map(decode).transpose().map_err(|e| bad(path, e))
+                })
+                .collect::<Result<_, _>>()?;
+            for block in blocks.into_iter().flatten() {
+                let put = placed.put(&block, header, channels, extent, &mut put);
+                put.ok_or_else(|| unsound(path, "a block is not where or what it should be"))?;
+            }
+        }
+        if placed.pixels != count {
+            return Err(unsound(path, "blocks are missing"));
+        }
+        Ok(())
+    }
+}
+
+fn bad(path: &Path, error: exr::error::Error) -> ReadError {
+    match error {
+        exr::error::Error::Io(_) => unsound(path, "it ends too early"),
+        other => unsound(path, other),
+    }
 }
 
 /// The part that has colours, and where among its channels red, green and blue are.
@@ -218,15 +341,15 @@ struct Placed {
 }
 
 impl Placed {
-    /// Puts a decoded block into the picture: line by line, of each channel by channel. None where it
-    /// lies outside, has another length than its pixels need, or was there before.
+    /// Hands a decoded block over: line by line, of each channel by channel. None where it lies outside,
+    /// has another length than its pixels need, or was there before.
     fn put(
         &mut self,
         block: &UncompressedBlock,
         header: &Header,
-        channels: &[usize; 3],
+        channels: &[usize],
         [width, height]: [u32; 2],
-        pixels: &mut [Rgb],
+        put: &mut impl FnMut(usize, usize, SampleType, &[u8]),
     ) -> Option<()> {
         let (Vec2(x, y), Vec2(columns, rows)) =
             (block.index.pixel_position, block.index.pixel_size);
@@ -240,15 +363,13 @@ impl Placed {
         }
         let list = &header.channels.list;
         let size = |c: usize| list[c].sample_type.bytes_per_sample();
-        let starts = channels.map(|c| columns * (0..c).map(size).sum::<usize>());
+        let starts: Vec<usize> =
+            channels.iter().map(|c| columns * (0..*c).map(size).sum::<usize>()).collect();
         for (row, line) in block.data.chunks_exact(line_bytes).enumerate() {
             let first = (y + row) * width as usize + x;
-            for (i, pixel) in pixels[first..first + columns].iter_mut().enumerate() {
-                let value = |k: usize| {
-                    let channel = channels[k];
-                    sample(list[channel].sample_type, &line[starts[k] + i * size(channel)..])
-                };
-                *pixel = Rgb::new(value(0), value(1), value(2));
+            for (k, (&channel, &start)) in channels.iter().zip(&starts).enumerate() {
+                let values = &line[start..start + columns * size(channel)];
+                put(first, k, list[channel].sample_type, values);
             }
         }
         self.pixels += columns * rows;

@@ -30,6 +30,7 @@ mod polygon;
 mod scene_file;
 mod scene_toml;
 mod source;
+mod state;
 mod stl;
 mod text;
 mod transforms;
@@ -49,3 +50,4 @@ pub use output::{Attribute, AttributeValue, check_writable, remove_unfinished, w
 pub use picture::{read_picture, read_png};
 pub use png::write_png;
 pub use scene_file::{LoadError, LoadOptions, LoadedScene, load_scene};
+pub use state::{StateFile, StateView, read_state, write_state};

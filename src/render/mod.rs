@@ -2,18 +2,20 @@
 //! up, and stops where it is told to. It owns threads and order; it knows neither files nor terminals, and
 //! tells whoever asks through an [`Observer`].
 
+mod state;
 mod stop;
 mod tiles;
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+pub use self::state::{BlockState, RenderState, block_origins};
 use self::stop::SoFar;
 pub use self::stop::{Stop, StopRules};
-use self::tiles::{Pass, TileRenderer, Workspace, tiles};
+use self::tiles::{Tile, TileOutput, TileRenderer, Workspace, tiles};
 use crate::accel::{RayQuery, with_accel};
 use crate::film::{Film, FilterTable, PixelRect};
 use crate::integrator::{Ao, Everything, Flat, Integrator, Local, RayCounts, Tree, Whitted};
@@ -34,6 +36,13 @@ pub struct RenderJob {
     pub variant: Option<Variant>,
     /// When it is over; without it, after the samples that the scene says.
     pub stop: Option<StopRules>,
+    /// Number of the first sample of every pixel: 0, but for parts of a render.
+    pub first_sample: u32,
+    /// Whether what the samples add up to is kept, for [`Rendered::state`]: 100 to 400 bytes a pixel.
+    pub keep_state: bool,
+    /// About how long a pass over the picture should last, so that there is something to see or to keep
+    /// as often; does not change the picture. It implies `keep_state`.
+    pub pass_time: Option<Duration>,
 }
 
 /// Hears how a render goes, and ends it. Called from all threads.
@@ -47,6 +56,33 @@ pub trait Observer: Sync {
     fn stop(&self) -> bool {
         false
     }
+
+    /// Whether [`Observer::look`] is to be called as soon as the tiles that are being worked on are done.
+    fn wants_look(&self) -> bool {
+        false
+    }
+
+    /// Sees how far the render is, while it stands still.
+    fn look(&self, snapshot: &Snapshot<'_>) {
+        let _ = snapshot;
+    }
+}
+
+/// A render that stands still for a moment.
+#[derive(Debug)]
+pub struct Snapshot<'a> {
+    /// The picture so far: blocks that were not reached are black.
+    pub film: &'a Film,
+    /// All blocks, where sums are kept; else none.
+    pub blocks: &'a [&'a BlockState],
+    /// The number of the first sample.
+    pub first_sample: u32,
+    /// Number of the sample at which the last finished pass of all blocks ended.
+    pub passed: u32,
+    /// Rays traced.
+    pub rays: &'a RayCounts,
+    /// Samples that were left out.
+    pub non_finite: &'a NonFinite,
 }
 
 /// Hears nothing.
@@ -57,7 +93,8 @@ impl Observer for () {}
 pub struct Rendered {
     /// The picture. Blocks that were not reached are black.
     pub film: Film,
-    /// Samples that every pixel has; some have more where the observer ended it.
+    /// Samples that every pixel has, those before the first not counted; some have more where the
+    /// observer ended it.
     pub samples: u32,
     /// Rays traced.
     pub rays: RayCounts,
@@ -65,6 +102,8 @@ pub struct Rendered {
     pub non_finite: NonFinite,
     /// What ended it.
     pub stop: Stop,
+    /// What to go on from, where it was to be kept.
+    pub state: Option<RenderState>,
 }
 
 /// Samples that came out as NaN or infinite.
@@ -76,30 +115,53 @@ pub struct NonFinite {
     pub first: Vec<([u32; 2], u32)>,
 }
 
+impl NonFinite {
+    /// Adds those of another part; of which the first few are told does not depend on the order.
+    fn add(&mut self, mut other: Self) {
+        self.count += other.count;
+        self.first.append(&mut other.first);
+        self.first.sort_unstable_by_key(|([x, y], sample)| (*y, *x, *sample));
+        self.first.truncate(NON_FINITE_TOLD);
+    }
+}
+
 /// Renders a scene on the threads of the current rayon pool. The picture depends on scene, job and
 /// instruction set alone, not on the number of threads or their order (but for surfaces that coincide
 /// in a hierarchy built at low quality).
 pub fn render(scene: &Scene, job: &RenderJob, observer: &dyn Observer) -> Rendered {
+    resume(scene, job, None, observer)
+}
+
+/// Goes on with a render of the same scene and job, to the picture that it would have become.
+pub fn resume(
+    scene: &Scene,
+    job: &RenderJob,
+    state: Option<RenderState>,
+    observer: &dyn Observer,
+) -> Rendered {
     // Static dispatch from here on: one loop of those that are compiled is run.
-    with_accel!(&scene.accel, query => choose(scene, query, job, observer))
+    with_accel!(&scene.accel, query => choose(scene, query, job, state, observer))
 }
 
 fn choose<Q: RayQuery>(
     scene: &Scene,
     query: &Q,
     job: &RenderJob,
+    state: Option<RenderState>,
     observer: &dyn Observer,
 ) -> Rendered {
     let depth = match scene.settings.integrator {
-        IntegratorKind::Flat => return run(scene, query, &Flat, job, observer),
-        IntegratorKind::Ao => return run(scene, query, &Ao, job, observer),
+        IntegratorKind::Flat => return run(scene, query, &Flat, job, state, observer),
+        IntegratorKind::Ao => return run(scene, query, &Ao, job, state, observer),
         IntegratorKind::Direct => None,
         IntegratorKind::Whitted => Some(scene.settings.max_depth),
     };
     match job.variant.unwrap_or(scene.requirements.variant) {
-        Variant::Local => run(scene, query, &Whitted::<Local>::new(depth), job, observer),
-        Variant::Tree => run(scene, query, &Whitted::<Tree>::new(depth), job, observer),
-        Variant::Everything => run(scene, query, &Whitted::<Everything>::new(depth), job, observer),
+        Variant::Local => run(scene, query, &Whitted::<Local>::new(depth), job, state, observer),
+        Variant::Tree => run(scene, query, &Whitted::<Tree>::new(depth), job, state, observer),
+        Variant::Everything => {
+            run(scene, query, &Whitted::<Everything>::new(depth), job, state, observer)
+        }
     }
 }
 
@@ -108,69 +170,209 @@ fn run<Q: RayQuery, I: Integrator>(
     query: &Q,
     integrator: &I,
     job: &RenderJob,
+    state: Option<RenderState>,
     observer: &dyn Observer,
 ) -> Rendered {
     let whole = PixelRect::whole(scene.size);
     let window = job.crop.map_or(whole, |crop| crop.intersection(&whole));
-    let samples = scene.settings.samples;
-    let rules = job.stop.unwrap_or(StopRules { samples, error: None, deadline: None });
-    // Sums are kept only where it may go on from there.
-    let goes_on = rules.look_at_the_film();
-    let film = Mutex::new(Film::new(scene.size, window, goes_on || rules.samples > 1));
-    let totals = Mutex::new((RayCounts::default(), NonFinite::default()));
-    let rays_done = AtomicU64::new(0);
-    let mut tiles = tiles(&window);
+    let end = job.first_sample + scene.settings.samples;
+    let rules = job.stop.unwrap_or(StopRules { samples: end, error: None, deadline: None });
+    // Sums are kept only where something may go on from there.
+    let is_kept = rules.look_at_the_film()
+        || job.keep_state
+        || job.pass_time.is_some()
+        || job.first_sample > 0
+        || state.is_some();
     let filter = FilterTable::new(scene.settings.filter);
     let renderer = TileRenderer { scene, query, integrator, filter, seed: job.seed, window };
-
-    let mut so_far = SoFar::NOTHING;
-    let stop = loop {
-        let done = so_far.samples;
-        let to = if goes_on { rules.next(&so_far) } else { rules.samples };
-        let expected = if done > 0 { rules.expected(&so_far) } else { f64::from(rules.samples) };
-        let pass = Pass { samples: done..to, goes_on };
-        let (clock, taken) = (Instant::now(), to - done);
-        let pixels_done = AtomicU64::new(0);
-        tiles.par_iter_mut().for_each_init(Workspace::new, |workspace, tile| {
-            renderer.render(tile, &pass, workspace, observer);
-            let output = &mut workspace.output;
-            {
-                let mut film = film.lock().unwrap_or_else(PoisonError::into_inner);
-                output.blocks.iter().for_each(|block| film.put(block));
-            }
-            {
-                let mut totals = totals.lock().unwrap_or_else(PoisonError::into_inner);
-                totals.0.add(&output.rays);
-                totals.1.count += output.non_finite.count;
-                totals.1.first.append(&mut output.non_finite.first);
-            }
-            let pixels = pixels_done.fetch_add(output.pixels, Ordering::Relaxed) + output.pixels;
-            let traced = output.rays.total();
-            let rays = rays_done.fetch_add(traced, Ordering::Relaxed) + traced;
-            let share = pixels as f64 / window.area() as f64;
-            let samples = f64::from(done) + share * f64::from(taken);
-            observer.progress((samples / expected).min(1.0), rays);
-        });
-        // A stop that was asked for with the last block cut nothing off.
-        if pixels_done.into_inner() < window.area() as u64 {
-            break Stop::Interrupted;
-        }
-        let film = film.lock().unwrap_or_else(PoisonError::into_inner);
-        let error = rules.error.and_then(|_| film.relative_error());
-        so_far = SoFar { samples: to, error, per_sample: clock.elapsed() / taken };
-        if let Some(stop) = rules.end(&so_far) {
-            break stop;
-        }
+    let mut run = Run {
+        renderer,
+        observer,
+        film: Mutex::new(match &state {
+            Some(state) => state.film(scene.size),
+            None => Film::new(scene.size, window, is_kept || rules.samples > 1),
+        }),
+        tiles: Vec::new(),
+        totals: Mutex::new((RayCounts::default(), NonFinite::default())),
+        samples_done: AtomicU64::new(0),
+        rays_done: AtomicU64::new(0),
+        first_sample: job.first_sample,
+        passed: job.first_sample,
     };
-
-    let (rays, mut non_finite) = totals.into_inner().unwrap_or_default();
-    // Threads finish in any order; what is told does not depend on it.
-    non_finite.first.sort_unstable_by_key(|([x, y], sample)| (*y, *x, *sample));
-    non_finite.first.truncate(NON_FINITE_TOLD);
-    let mut film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let samples = if goes_on { so_far.samples.max(1) } else { rules.samples };
-    if samples == 1 {
-        film.standard_error = None;
+    if is_kept {
+        let state = state.unwrap_or_else(|| RenderState::before(job.first_sample, window));
+        run.restore(state);
+    } else {
+        run.tiles = tiles(&window).map(|at| Tile { at, blocks: Vec::new(), done: 0 }).collect();
     }
-    Rendered { film, samples, rays, non_finite, stop }
+    let stop = run.until_it_is_over(&rules, is_kept, job.pass_time);
+    run.finish(stop, is_kept, rules.samples)
+}
+
+/// A render under way.
+struct Run<'a, Q, I> {
+    renderer: TileRenderer<'a, Q, I>,
+    observer: &'a dyn Observer,
+    film: Mutex<Film>,
+    tiles: Vec<Tile>,
+    totals: Mutex<(RayCounts, NonFinite)>,
+    /// Of pixels of the window.
+    samples_done: AtomicU64,
+    rays_done: AtomicU64,
+    first_sample: u32,
+    /// Number of the sample at which the last finished pass ended.
+    passed: u32,
+}
+
+impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
+    fn restore(&mut self, mut state: RenderState) {
+        let samples = state.blocks.iter().map(|block| {
+            let area = tiles::block_in(&self.renderer.window, block.origin).area() as u64;
+            area * block.sums.samples().len() as u64
+        });
+        self.samples_done = AtomicU64::new(samples.sum());
+        self.rays_done = AtomicU64::new(state.rays.total());
+        self.passed = state.passed;
+        self.tiles = state.take_tiles();
+        self.totals = Mutex::new((state.rays, state.non_finite));
+    }
+
+    fn blocks(&self) -> impl Iterator<Item = &BlockState> {
+        self.tiles.iter().flat_map(|tile| &tile.blocks)
+    }
+
+    /// Takes samples, pass by pass, until one of the rules holds.
+    fn until_it_is_over(
+        &mut self,
+        rules: &StopRules,
+        is_kept: bool,
+        pass_time: Option<Duration>,
+    ) -> Stop {
+        if !is_kept {
+            let done = self.pass(rules.samples, f64::from(rules.samples));
+            return if done { Stop::Samples } else { Stop::Interrupted };
+        }
+        let mut so_far = SoFar { samples: self.passed, ..SoFar::NOTHING };
+        loop {
+            // Where a pass was cut short, it goes to where it was to go, unless less is asked for now.
+            let mut target = self.blocks().map(|block| block.target).max().unwrap_or(0);
+            let most = self.blocks().map(|block| block.sums.samples().end).max().unwrap_or(0);
+            target = target.min(rules.samples.max(most));
+            if target <= self.passed {
+                so_far.error = rules.error.and_then(|_| {
+                    self.film.get_mut().unwrap_or_else(PoisonError::into_inner).relative_error()
+                });
+                if self.passed > self.first_sample
+                    && let Some(stop) = rules.end(&so_far)
+                {
+                    return stop;
+                }
+                target = rules.next(&so_far);
+                for block in self.tiles.iter_mut().flat_map(|tile| &mut tile.blocks) {
+                    block.target = target;
+                }
+            }
+            while so_far.samples < target {
+                let limit = rules.limit(&so_far, target, pass_time);
+                let expected = rules.expected(&so_far) - f64::from(self.first_sample);
+                let (clock, before) = (Instant::now(), *self.samples_done.get_mut());
+                if !self.pass(limit, expected) {
+                    return Stop::Interrupted;
+                }
+                let taken = *self.samples_done.get_mut() - before;
+                so_far.samples = limit;
+                if taken > 0 {
+                    let area = self.renderer.window.area() as f64;
+                    so_far.per_sample = clock.elapsed().mul_f64(area / taken as f64);
+                }
+                if limit < target && rules.is_late(&so_far) {
+                    self.passed = limit;
+                    return Stop::Time;
+                }
+            }
+            self.passed = target;
+        }
+    }
+
+    /// Renders a pass: every block up to its target, or to sample number `limit`; stands still for a look
+    /// now and then. `expected` is how many samples it will be in all. False where the observer ended it.
+    fn pass(&mut self, limit: u32, expected: f64) -> bool {
+        let mut tiles = std::mem::take(&mut self.tiles);
+        let is_over = loop {
+            let (ended, waits) = (AtomicBool::new(false), AtomicBool::new(false));
+            let this = &*self;
+            let left = tiles.par_iter_mut().filter(|tile| tile.done < limit);
+            left.for_each_init(Workspace::new, |workspace, tile| {
+                // Tiles that have begun are finished; the others come after the look.
+                if waits.load(Ordering::Relaxed) || this.observer.wants_look() {
+                    waits.store(true, Ordering::Relaxed);
+                    return;
+                }
+                if this.renderer.render(tile, limit, workspace, this.observer) {
+                    tile.done = limit;
+                } else {
+                    ended.store(true, Ordering::Relaxed);
+                }
+                this.collect(&mut workspace.output, expected);
+            });
+            if ended.into_inner() {
+                break false;
+            }
+            if !waits.into_inner() {
+                break true;
+            }
+            self.look(&tiles);
+        };
+        self.tiles = tiles;
+        is_over
+    }
+
+    /// Puts what came of a tile to the rest.
+    fn collect(&self, output: &mut TileOutput, expected: f64) {
+        {
+            let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
+            output.blocks.iter().for_each(|block| film.put(block));
+        }
+        {
+            let mut totals = self.totals.lock().unwrap_or_else(PoisonError::into_inner);
+            totals.0.add(&output.rays);
+            totals.1.add(std::mem::take(&mut output.non_finite));
+        }
+        let add = |total: &AtomicU64, n| total.fetch_add(n, Ordering::Relaxed) + n;
+        let samples = add(&self.samples_done, output.samples) as f64;
+        let rays = add(&self.rays_done, output.rays.total());
+        let share = samples / (expected * self.renderer.window.area() as f64);
+        self.observer.progress(share.min(1.0), rays);
+    }
+
+    fn look(&mut self, tiles: &[Tile]) {
+        let blocks: Vec<&BlockState> = tiles.iter().flat_map(|tile| &tile.blocks).collect();
+        let (rays, non_finite) = self.totals.get_mut().unwrap_or_else(PoisonError::into_inner);
+        self.observer.look(&Snapshot {
+            film: self.film.get_mut().unwrap_or_else(PoisonError::into_inner),
+            blocks: &blocks,
+            first_sample: self.first_sample,
+            passed: self.passed,
+            rays,
+            non_finite,
+        });
+    }
+
+    fn finish(self, stop: Stop, is_kept: bool, samples: u32) -> Rendered {
+        let (rays, non_finite) = self.totals.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut film = self.film.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let samples = if is_kept { (self.passed - self.first_sample).max(1) } else { samples };
+        if samples == 1 {
+            film.standard_error = None;
+        }
+        let state = is_kept.then(|| RenderState {
+            window: film.window,
+            first_sample: self.first_sample,
+            passed: self.passed,
+            blocks: self.tiles.into_iter().flat_map(|tile| tile.blocks).collect(),
+            rays,
+            non_finite: non_finite.clone(),
+        });
+        Rendered { film, samples, rays, non_finite, stop, state }
+    }
 }

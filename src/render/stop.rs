@@ -55,6 +55,9 @@ impl StopRules {
     /// pass over the picture costs, but no further than twice as far. Without a deadline it follows from
     /// the picture alone, so that where a render stops by its error does not depend on the machine.
     pub(super) fn next(&self, so_far: &SoFar) -> u32 {
+        if !self.look_at_the_film() {
+            return self.samples;
+        }
         let done = so_far.samples;
         let by_error = match (self.error, so_far.expected_by_error(self.error)) {
             (None, _) => f64::INFINITY,
@@ -62,14 +65,20 @@ impl StopRules {
         };
         let goal = by_error.min(so_far.expected_by_time(self.deadline).unwrap_or(f64::INFINITY));
         let most = (0.5 * (f64::from(done) + goal)).min(2.0 * f64::from(done));
-        let mut to = barrier_after(done);
-        loop {
-            let further = barrier_after(to);
-            if f64::from(further) > most {
-                return to.min(self.samples);
-            }
-            to = further;
-        }
+        last_barrier(done, most).min(self.samples)
+    }
+
+    /// How far to go on the way to `target` before the next look at the clock: as many samples as
+    /// `pass_time` allows.
+    pub(super) fn limit(&self, so_far: &SoFar, target: u32, pass_time: Option<Duration>) -> u32 {
+        let (done, per_sample) = (so_far.samples, so_far.per_sample.as_secs_f64());
+        let most = match pass_time {
+            // Of a render that goes on nothing is known yet.
+            _ if per_sample == 0.0 && (pass_time.is_some() || self.deadline.is_some()) => 0.0,
+            Some(time) => f64::from(done) + time.as_secs_f64() / per_sample,
+            None => return target,
+        };
+        last_barrier(done, most).min(target)
     }
 
     /// The rule that ends a render, if one does.
@@ -83,9 +92,13 @@ impl StopRules {
         if done >= self.samples {
             return Some(Stop::Samples);
         }
-        let least = f64::from(barrier_after(done).min(self.samples));
-        let is_late = so_far.expected_by_time(self.deadline).is_some_and(|n| n < least);
-        is_late.then_some(Stop::Time)
+        self.is_late(so_far).then_some(Stop::Time)
+    }
+
+    /// Whether not even the next few samples can be taken in time.
+    pub(super) fn is_late(&self, so_far: &SoFar) -> bool {
+        let least = f64::from(barrier_after(so_far.samples).min(self.samples));
+        so_far.expected_by_time(self.deadline).is_some_and(|n| n < least)
     }
 
     /// How many samples it will be, as far as can be told.
@@ -137,6 +150,18 @@ fn barrier_after(done: u32) -> u32 {
     }
     let step = (1 << each.ilog2() >> 3).max(1);
     (each / step + 1) * step * REPLICATES
+}
+
+/// The last such count that is not above `most`; at least the next one.
+fn last_barrier(done: u32, most: f64) -> u32 {
+    let mut to = barrier_after(done);
+    loop {
+        let further = barrier_after(to);
+        if f64::from(further) > most {
+            return to;
+        }
+        to = further;
+    }
 }
 
 #[cfg(test)]

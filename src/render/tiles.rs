@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use glam::DVec2;
 
+use super::state::BlockState;
 use super::{NON_FINITE_TOLD, NonFinite, Observer};
 use crate::accel::{LANES, RayBlock, RayQuery};
-use crate::film::{BLOCK_LANES, BlockAccumulator, BlockPixels, BlockSums, FilterTable, PixelRect};
+use crate::film::{BLOCK_LANES, BlockAccumulator, BlockPixels, FilterTable, PixelRect};
 use crate::integrator::{CameraBlock, Integrator, RayCounts};
 use crate::sampler::{Dimensions, PixelSampler, REPLICATES, Sampler};
 use crate::scene::Scene;
@@ -20,30 +21,33 @@ const STOP_EVERY: u32 = 256;
 const _: () = assert!(LANES == BLOCK_LANES, "a block of rays is a block of pixels");
 
 /// The tiles that touch `window`, in rows, at absolute positions: multiples of [`TILE`].
-pub(super) fn tiles(window: &PixelRect) -> Vec<Tile> {
+pub(super) fn tiles(window: &PixelRect) -> impl Iterator<Item = PixelRect> + use<> {
     let span = |from: u32, to: u32| (from / TILE..to.div_ceil(TILE)).map(|i| i * TILE);
-    span(window.y0, window.y1)
-        .flat_map(|y0| {
-            span(window.x0, window.x1).map(move |x0| {
-                let at = PixelRect { x0, y0, x1: x0 + TILE, y1: y0 + TILE };
-                Tile { at, sums: Vec::new() }
-            })
-        })
-        .collect()
+    let columns = span(window.x0, window.x1);
+    span(window.y0, window.y1).flat_map(move |y0| {
+        columns.clone().map(move |x0| PixelRect { x0, y0, x1: x0 + TILE, y1: y0 + TILE })
+    })
+}
+
+/// The first pixels of the blocks of `tile` that touch `window`, in rows.
+pub(super) fn blocks(tile: &PixelRect, window: &PixelRect) -> impl Iterator<Item = [u32; 2]> {
+    let touches = |[x, y]: &[u32; 2]| block_in(window, [*x, *y]).area() > 0;
+    let (x, y) = ((tile.x0..tile.x1).step_by(4), (tile.y0..tile.y1).step_by(4));
+    y.flat_map(move |y| x.clone().map(move |x| [x, y])).filter(touches)
+}
+
+/// What of the block at `origin` lies in `window`.
+pub(super) fn block_in(window: &PixelRect, [x, y]: [u32; 2]) -> PixelRect {
+    PixelRect { x0: x, y0: y, x1: x + 4, y1: y + 4 }.intersection(window)
 }
 
 /// A tile, and what the samples of its blocks add up to as far as they are taken.
 pub(super) struct Tile {
     pub(super) at: PixelRect,
-    /// In the order of the blocks; empty before the first pass, and where there is only one.
-    sums: Vec<BlockSums>,
-}
-
-/// Samples of every pixel that are taken in one go.
-pub(super) struct Pass {
-    pub(super) samples: Range<u32>,
-    /// Whether others follow.
-    pub(super) goes_on: bool,
+    /// In the order of [`blocks`]; none where sums are not kept.
+    pub(super) blocks: Vec<BlockState>,
+    /// Number of the sample at which the last pass over it ended.
+    pub(super) done: u32,
 }
 
 pub(super) struct TileRenderer<'a, Q, I> {
@@ -73,8 +77,8 @@ pub(super) struct TileOutput {
     pub(super) blocks: Vec<BlockPixels>,
     pub(super) rays: RayCounts,
     pub(super) non_finite: NonFinite,
-    /// Pixels of the window that were finished.
-    pub(super) pixels: u64,
+    /// Samples of pixels of the window that were taken.
+    pub(super) samples: u64,
 }
 
 impl TileOutput {
@@ -83,62 +87,53 @@ impl TileOutput {
         self.blocks.clear();
         self.rays = RayCounts::default();
         self.non_finite = NonFinite::default();
-        self.pixels = 0;
+        self.samples = 0;
     }
 }
 
 impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
-    /// Renders a pass of the blocks of a tile that touch the window; whole blocks, as a packet's hits at
-    /// shared edges may depend on its neighbours, and a crop must not. All of them are finished unless the
-    /// observer ends it.
+    /// Renders the blocks of a tile that touch the window, each up to its target or to sample number
+    /// `limit`; whole blocks, as a packet's hits at shared edges may depend on its neighbours, and a crop
+    /// must not. False where the observer ended it before all were finished.
     pub(super) fn render(
         &self,
         tile: &mut Tile,
-        pass: &Pass,
+        limit: u32,
         workspace: &mut Workspace,
         observer: &dyn Observer,
-    ) {
+    ) -> bool {
         let Workspace { sums, output } = workspace;
         output.restart();
-        let mut number = 0;
-        for y in (tile.at.y0..tile.at.y1).step_by(4) {
-            for x in (tile.at.x0..tile.at.x1).step_by(4) {
-                let block = PixelRect { x0: x, y0: y, x1: x + 4, y1: y + 4 };
-                let block = block.intersection(&self.window);
-                if block.area() == 0 {
-                    continue;
-                }
-                if pass.goes_on && tile.sums.len() == number {
-                    tile.sums.push(BlockSums::default());
-                }
-                let kept = tile.sums.get_mut(number);
-                match &kept {
-                    Some(kept) => sums.resume(kept),
-                    None => sums.restart(0),
-                }
-                if !self.render_block([x, y], &block, pass, sums, output, observer) {
-                    return;
-                }
-                if let Some(kept) = kept {
-                    sums.store(kept);
-                }
-                output.pixels += block.area() as u64;
-                number += 1;
-            }
+        if tile.blocks.is_empty() {
+            return blocks(&tile.at, &self.window).all(|origin| {
+                sums.restart(0);
+                self.render_block(origin, 0..limit, false, sums, output, observer)
+            });
         }
+        tile.blocks.iter_mut().filter(|block| block.is_behind(limit)).all(|block| {
+            let to = block.target.min(limit);
+            sums.resume(&block.sums);
+            let samples = block.sums.samples().end..to;
+            let done = self.render_block(block.origin, samples, true, sums, output, observer);
+            if done {
+                sums.store(&mut block.sums);
+            }
+            done
+        })
     }
 
-    /// Renders the block at `origin`, of which `wanted` is inside the window, on top of `sums`. False where
-    /// the observer ended it; the pass over the block is then discarded.
+    /// Renders samples of the block at `origin` on top of `sums`. False where the observer ended it; they
+    /// are then discarded.
     fn render_block(
         &self,
         origin: [u32; 2],
-        wanted: &PixelRect,
-        pass: &Pass,
+        samples: Range<u32>,
+        is_kept: bool,
         sums: &mut BlockAccumulator,
         output: &mut TileOutput,
         observer: &dyn Observer,
     ) -> bool {
+        let wanted = block_in(&self.window, origin);
         let pixel = |lane: usize| [origin[0] + lane as u32 % 4, origin[1] + lane as u32 / 4];
         let whole = PixelRect::whole(self.scene.size);
         let inside = (0..LANES)
@@ -148,10 +143,11 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             })
             .fold(0u16, |bits, lane| bits | 1 << lane);
 
-        let is_all = pass.samples == (0..1) && !pass.goes_on;
+        let is_all = samples == (0..1) && !is_kept;
+        let taken = samples.len() as u64;
         let pixels: [PixelSampler; LANES] =
             std::array::from_fn(|lane| PixelSampler::new(self.seed, pixel(lane)));
-        for sample in pass.samples.clone() {
+        for sample in samples {
             if sample % STOP_EVERY == 0 && observer.stop() {
                 return false;
             }
@@ -186,6 +182,7 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
         if !is_all {
             output.blocks.push(sums.finish(origin));
         }
+        output.samples += taken * wanted.area() as u64;
         true
     }
 
