@@ -10,7 +10,7 @@ use super::units::{
     Part, parse_bytes, parse_count, parse_crop, parse_part, parse_share, parse_size, parse_time,
 };
 use crate::accel::{AccelKind, BuildQuality, Precision};
-use crate::film::{Filter, PixelRect};
+use crate::film::{Aov, Filter, PixelRect};
 use crate::geometry::generate::GeneratedKind;
 use crate::io::{ExrCompression, NonFinite, PixelType};
 use crate::measure::bench::StructureKind;
@@ -180,6 +180,10 @@ pub(super) struct RenderArgs {
     /// Takes only part K of the samples, of N, for `alhazen merge`: 1/8 to 8/8. The file is a picture too
     #[arg(long, value_name = "K/N", value_parser = parse_part, conflicts_with_all = ["error", "time"])]
     pub(super) part: Option<Part>,
+
+    /// Layers of EXR files beside the colours: all, or names separated by commas; see docs/output.md
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = layer_names())]
+    pub(super) layers: Vec<LayerName>,
 
     #[command(flatten)]
     pub(super) format: FormatArgs,
@@ -378,6 +382,21 @@ pub(super) struct GenerateArgs {
     /// No progress and no closing line: only errors
     #[arg(long, short)]
     pub(super) quiet: bool,
+}
+
+/// What `--layers` names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LayerName {
+    All,
+    One(Aov),
+}
+
+fn layer_names() -> impl TypedValueParser<Value = LayerName> {
+    let names = ["all"].into_iter().chain(Aov::ALL.into_iter().map(Aov::name));
+    PossibleValuesParser::new(names).map(|text| {
+        let found = Aov::ALL.into_iter().find(|aov| aov.name() == text);
+        found.map_or(LayerName::All, LayerName::One)
+    })
 }
 
 /// A limit of a metric.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::args::CompareArgs;
 use super::units::grouped;
 use super::{Failure, Outcome, print};
-use crate::film::{Film, Picture, PixelRect};
+use crate::film::{Film, Layers, Picture, PixelRect};
 use crate::io::{
     ExrOptions, PixelType, WriteError, check_writable, read_picture, write_exr, write_png,
     write_text,
@@ -230,5 +230,5 @@ fn film(picture: Picture) -> Film {
         Some((x0, y0)) => (picture.size, PixelRect { x0, y0, x1: x0 + width, y1: y0 + height }),
         None => (picture.extent, PixelRect::whole(picture.extent)),
     };
-    Film { size, window, mean: picture.pixels, standard_error: None }
+    Film { size, window, mean: picture.pixels, standard_error: None, layers: Layers::default() }
 }

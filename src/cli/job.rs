@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::args::{RenderArgs, SceneArgs};
+use super::args::{LayerName, RenderArgs, SceneArgs};
 use super::keep::{
     CHECKPOINT_EVERY, Keeper, Watch, checkpoint_path, part_attributes, part_range,
     resuming_command, write_end,
@@ -17,8 +17,8 @@ use super::progress::{Progress, catch_interrupts, interrupted};
 use super::units::Part;
 use super::{Failure, Outcome, print, report, tell};
 use crate::accel::{AccelError, AccelKind, BuildOptions, Compact};
-use crate::film::PixelRect;
-use crate::io::{LoadOptions, LoadedScene, available_memory, load_scene};
+use crate::film::{Aov, PixelRect};
+use crate::io::{ExrCompression, LoadOptions, LoadedScene, available_memory, load_scene};
 use crate::render::{RenderJob, Rendered, Stop, StopRules, resume};
 use crate::scene::{RenderSettings, Scene, SceneError};
 
@@ -40,6 +40,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     let quiet = args.scene.quiet;
     let outputs = outputs(args)?;
     check_format(&args.format)?;
+    let layers = layers(args, &outputs)?;
     let checkpoint =
         (args.checkpoint.is_some() || args.resume).then(|| checkpoint_path(&outputs[0].path));
     let targets = outputs.iter().map(|o| &o.path).chain(&args.stats).chain(&checkpoint);
@@ -78,8 +79,10 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         first_sample: part.as_ref().map_or(0, |(_, range)| range.start),
         keep_state: is_kept,
         pass_time: checkpoint.as_ref().map(|_| every),
+        layers,
     };
     let mut identity = report::identity(&scene, hash, args.seed);
+    identity.extend(report::of_layers(&scene, &job.layers));
     if let Some((part, _)) = part {
         identity.extend(part_attributes(part, samples));
     }
@@ -287,6 +290,25 @@ fn outputs(args: &RenderArgs) -> Result<Vec<Output>, Failure> {
         return Err(Failure::BadInput(message.to_owned()));
     }
     Ok(outputs)
+}
+
+/// What `--layers` asks for, in the order of [`Aov::ALL`].
+fn layers(args: &RenderArgs, outputs: &[Output]) -> Result<Vec<Aov>, Failure> {
+    if args.layers.is_empty() {
+        return Ok(Vec::new());
+    }
+    if !outputs.iter().any(Output::is_exr) {
+        let message = "--layers: only EXR files hold layers; accepted with an -o that ends in .exr";
+        return Err(Failure::BadInput(message.to_owned()));
+    }
+    if args.format.exr_compression == ExrCompression::Pxr24 {
+        let message = "--layers: pxr24 would round layers; accepted: another --exr-compression";
+        return Err(Failure::BadInput(message.to_owned()));
+    }
+    let is_wanted = |aov: &Aov| {
+        args.layers.iter().any(|name| *name == LayerName::All || *name == LayerName::One(*aov))
+    };
+    Ok(Aov::ALL.into_iter().filter(is_wanted).collect())
 }
 
 fn check_part(part: Part, samples: u32) -> Result<Range<u32>, Failure> {

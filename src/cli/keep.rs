@@ -134,7 +134,7 @@ impl Keeper {
         if !self.path.exists() {
             return Ok(None);
         }
-        let StateFile { state, attributes, size: of } =
+        let StateFile { state, attributes, size: of, .. } =
             read_state(&self.path).map_err(|e| Failure::BadInput(e.to_string()))?;
         let name = self.path.display().to_string();
         let refuse = |what: String| {

@@ -7,6 +7,7 @@ use super::keep::{difference, part_range};
 use super::outputs::{Output, check_format, check_targets, write_all};
 use super::units::{Part, parse_part};
 use super::{Failure, Outcome, job, print, report};
+use crate::film::CenterLayers;
 use crate::io::{Attribute, AttributeValue, StateFile, read_state};
 use crate::render::{RenderState, Stop};
 
@@ -18,6 +19,7 @@ struct Piece {
     file: String,
     size: [u32; 2],
     state: RenderState,
+    center: CenterLayers,
     attributes: Vec<Attribute>,
     part: Part,
     /// Samples of the whole.
@@ -65,7 +67,7 @@ pub(super) fn merge(args: &MergeArgs, start: Instant) -> Result<Outcome, Failure
 
     let (size, common) = (first.size, first.attributes.clone());
     let mut pieces = pieces.into_iter();
-    let Some(Piece { mut state, .. }) = pieces.next() else {
+    let Some(Piece { mut state, center, .. }) = pieces.next() else {
         return bad("no parts".to_owned());
     };
     for piece in pieces {
@@ -74,7 +76,8 @@ pub(super) fn merge(args: &MergeArgs, start: Instant) -> Result<Outcome, Failure
         joined
             .map_err(|_| Failure::BadInput(format!("{file}: does not follow the part before")))?;
     }
-    let film = pool.install(|| state.film(size));
+    let mut film = pool.install(|| state.film(size));
+    film.layers.center = center;
     let samples = state.samples().end;
     let mut attributes: Vec<Attribute> =
         common.into_iter().filter(|a| !OWN.contains(&a.name.as_str())).collect();
@@ -113,8 +116,8 @@ fn piece(file: String, read: StateFile) -> Result<Piece, Failure> {
         );
         return Err(Failure::BadInput(message));
     }
-    let StateFile { size, state, attributes } = read;
-    Ok(Piece { file, size, state, attributes, part, samples })
+    let StateFile { size, state, center, attributes } = read;
+    Ok(Piece { file, size, state, center, attributes, part, samples })
 }
 
 /// What is missing, and what is there twice.

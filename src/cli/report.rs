@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::units::{grouped, megabytes};
 use super::{Failure, job::Phases, print};
 use crate::accel::AccelInfo;
-use crate::film::Film;
-use crate::io::{Attribute, AttributeValue};
+use crate::film::{Aov, Film};
+use crate::io::{Attribute, AttributeValue, matte_attributes};
 use crate::render::{Rendered, Stop};
 use crate::scene::{Epsilon, IntegratorKind, Scene};
 
@@ -178,6 +178,23 @@ pub(super) fn identity(scene: &Scene, scene_hash: u64, seed: u64) -> Vec<Attribu
         text("alhazen.bias", biasing_options(scene)),
         Attribute::new("alhazen.origin", AttributeValue::Vector(scene.center.as_vec3().to_array())),
     ]
+}
+
+/// What it says of its layers.
+pub(super) fn of_layers(scene: &Scene, layers: &[Aov]) -> Vec<Attribute> {
+    if layers.is_empty() {
+        return Vec::new();
+    }
+    let names = layers.iter().map(|aov| aov.name()).collect::<Vec<_>>().join(" ");
+    let mut list = vec![Attribute::new("alhazen.layers", AttributeValue::Text(names))];
+    for aov in layers {
+        match aov {
+            Aov::CryptoObject => list.extend(matte_attributes(*aov, scene.object_names())),
+            Aov::CryptoMaterial => list.extend(matte_attributes(*aov, scene.material_names())),
+            _ => {}
+        }
+    }
+    list
 }
 
 /// What it says of what came of it.

@@ -183,6 +183,7 @@ impl BlockAccumulator {
             origin,
             mean: [Rgb::BLACK; BLOCK_LANES],
             standard_error: [Rgb::splat(f32::NAN); BLOCK_LANES],
+            samples: [0; BLOCK_LANES],
         };
         // Samples of each pixel, and replicates that have any.
         let (mut n, mut filled) = ([0.0; BLOCK_LANES], [0.0; BLOCK_LANES]);
@@ -190,6 +191,7 @@ impl BlockAccumulator {
             for lane in 0..BLOCK_LANES {
                 n[lane] += f64::from(total.count[lane]);
                 filled[lane] += f64::from(total.count[lane].min(1));
+                pixels.samples[lane] += total.count[lane];
             }
         }
         // A single replicate shows no error.
@@ -290,6 +292,8 @@ pub struct BlockPixels {
     /// Standard error of that mean; NaN where the samples do not show it: fewer than two replicates
     /// have any.
     pub standard_error: [Rgb; BLOCK_LANES],
+    /// Samples that counted.
+    pub samples: [u32; BLOCK_LANES],
 }
 
 impl BlockPixels {
@@ -304,12 +308,14 @@ impl BlockPixels {
             origin,
             mean: [Rgb::BLACK; BLOCK_LANES],
             standard_error: [Rgb::splat(f32::NAN); BLOCK_LANES],
+            samples: [0; BLOCK_LANES],
         };
         let mut dropped = 0;
         for (lane, value) in radiance.iter().enumerate() {
             let is_valid = valid >> lane & 1 == 1;
             let counts = is_valid & value.is_finite();
             dropped |= u16::from(is_valid & !counts) << lane;
+            pixels.samples[lane] = counts.into();
             // From nothing, as sums begin: −0 becomes 0.
             pixels.mean[lane] = Rgb::BLACK + if counts { *value } else { Rgb::BLACK };
         }

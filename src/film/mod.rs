@@ -2,11 +2,15 @@
 //! and the reconstruction filter. It knows pixels and samples, not scenes, and no file formats.
 
 mod accumulate;
+mod cryptomatte;
 mod filter;
+mod layers;
 mod picture;
 
 pub use accumulate::{BLOCK_LANES, BlockAccumulator, BlockPixels, BlockSums, SumNode};
+pub use cryptomatte::{cryptomatte_id, cryptomatte_key};
 pub use filter::{Filter, FilterSample, FilterTable};
+pub use layers::{Aov, CenterLayers, Layers, Shares, add_share};
 pub use picture::Picture;
 
 use rayon::prelude::*;
@@ -73,6 +77,8 @@ pub struct Film {
     /// Estimated standard error of that mean, in the same order, NaN where a pixel's samples show none;
     /// no plane where one sample a pixel shows it nowhere.
     pub standard_error: Option<Vec<Rgb>>,
+    /// What it holds beside colours.
+    pub layers: Layers,
 }
 
 impl Film {
@@ -80,7 +86,13 @@ impl Film {
     pub fn new(size: [u32; 2], window: PixelRect, with_error: bool) -> Self {
         // On all threads: most of the time goes into asking the system for the memory.
         let plane = || rayon::iter::repeat_n(Rgb::BLACK, window.area()).collect();
-        Self { size, window, mean: plane(), standard_error: with_error.then(plane) }
+        Self {
+            size,
+            window,
+            mean: plane(),
+            standard_error: with_error.then(plane),
+            layers: Layers::default(),
+        }
     }
 
     /// Writes the pixels of a block that lie inside the window.
@@ -91,6 +103,29 @@ impl Film {
                 self.mean[i] = mean;
                 if let Some(plane) = &mut self.standard_error {
                     plane[i] = error;
+                }
+                if let Some(samples) = self.layers.samples.get_mut(i) {
+                    *samples = block.samples[lane];
+                }
+            }
+        }
+    }
+
+    /// Writes the pixels of a block of a layer, by its place among the layers' means.
+    pub fn put_layer(&mut self, layer: usize, origin: [u32; 2], values: &[Rgb; BLOCK_LANES]) {
+        for (lane, value) in values.iter().enumerate() {
+            if let Some(i) = self.index(origin[0] + lane as u32 % 4, origin[1] + lane as u32 / 4) {
+                self.layers.means[layer].1[i] = *value;
+            }
+        }
+    }
+
+    /// Adds what the pixels of a block show to a Cryptomatte, by its place among them.
+    pub fn add_shares(&mut self, matte: usize, origin: [u32; 2], shares: &[Shares; BLOCK_LANES]) {
+        for (lane, shares) in shares.iter().enumerate() {
+            if let Some(i) = self.index(origin[0] + lane as u32 % 4, origin[1] + lane as u32 / 4) {
+                for (id, count) in shares {
+                    add_share(&mut self.layers.mattes[matte].1[i], *id, *count);
                 }
             }
         }

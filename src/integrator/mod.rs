@@ -2,10 +2,12 @@
 //! out; no threads, no files, no film.
 
 mod ao;
+mod first_hit;
 mod flat;
 mod whitted;
 
 pub use ao::Ao;
+pub use first_hit::FirstHits;
 pub use flat::Flat;
 pub use whitted::{Everything, Features, Local, TexturedHits, Tree, Whitted};
 
@@ -36,6 +38,19 @@ pub trait Integrator: Sync {
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
     ) -> [Rgb; LANES];
+
+    /// As [`Integrator::shade`]; beside it, what of that is the light of the first surface itself: its own,
+    /// and what it has straight from lights.
+    fn shade_split<Q: RayQuery>(
+        &self,
+        scene: &Scene,
+        query: &Q,
+        camera: &CameraBlock<'_>,
+        counts: &mut RayCounts,
+    ) -> ([Rgb; LANES], [Rgb; LANES]) {
+        let radiance = self.shade(scene, query, camera, counts);
+        (radiance, radiance)
+    }
 }
 
 /// Rays traced, by kind, and where branches of the ray tree ended.

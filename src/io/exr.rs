@@ -15,6 +15,7 @@ use exr::prelude::{ChannelDescription, Compression, LineOrder, SampleType, Vec2,
 use rayon::prelude::*;
 
 use super::error::WriteError;
+use super::layers::film_channels;
 use super::output::{Attribute, AttributeValue, write_whole};
 use crate::color::Rgb;
 use crate::film::{Film, PixelRect};
@@ -191,8 +192,8 @@ struct Scratch {
     numbers: Vec<u32>,
 }
 
-/// Writes the film's mean as channels R, G, B. The data window is the film's window, the display
-/// window the whole picture.
+/// Writes the film: its mean as channels R, G, B, and its layers ([`film_channels`]). The data window is
+/// the film's window, the display window the whole picture.
 ///
 /// Returns the type that was used: float where half was asked for but cannot hold the largest value.
 ///
@@ -204,9 +205,7 @@ pub fn write_exr(
     attributes: &[Attribute],
     options: &ExrOptions,
 ) -> Result<PixelType, WriteError> {
-    let names = ["R", "G", "B"].map(str::to_owned);
-    let channels = Channel::of_plane(names, &film.mean, film.window.width());
-    write_channels(path, film.size, &film.window, channels.into(), attributes, options)
+    write_channels(path, film.size, &film.window, film_channels(film), attributes, options)
 }
 
 /// Writes any channels of the `window` (the data window) of a picture of `size` (the display window).
@@ -299,7 +298,8 @@ fn header(
     let display = IntegerBounds::from_dimensions((width as usize, height as usize));
     let shared = ImageAttributes { chromaticities: Some(REC_709), ..ImageAttributes::new(display) };
     let list = channels.iter().map(|channel| {
-        ChannelDescription::named(channel.name.as_str(), channel.sample_type(pixel_type))
+        // Lossy compressions keep ratios, not differences.
+        ChannelDescription::new(channel.name.as_str(), channel.sample_type(pixel_type), false)
     });
     Header::new(Text::from(""), (window.width() as usize, window.height() as usize), list.collect())
         .with_encoding(

@@ -17,6 +17,7 @@ mod exr_read;
 mod fields;
 mod grid;
 mod image;
+mod layers;
 mod memory;
 mod mesh;
 mod mesh_write;
@@ -42,6 +43,7 @@ pub use exr::{
 pub use exr_read::read_exr;
 pub use grid::{SampleLayout, SampleType, read_npy, read_raw};
 pub use image::{ColorSpace, ImageFile, read_image};
+pub use layers::{CRYPTOMATTE_RANKS, film_channels, matte_attributes};
 pub use memory::available_memory;
 pub use mesh::{MeshFile, NonFinite, read_mesh};
 pub use mesh_write::write_mesh;

@@ -9,8 +9,11 @@ use std::path::Path;
 use super::error::{ReadError, WriteError};
 use super::exr::{Channel, ExrCompression, ExrOptions, write_channels};
 use super::exr_read::read_channels;
+use super::layers::{center_channels, center_from};
 use super::output::{Attribute, AttributeValue};
-use crate::film::{BLOCK_LANES, BlockSums, Film, PixelRect, SumNode};
+use crate::film::{
+    Aov, BLOCK_LANES, BlockSums, CenterLayers, Film, Layers, PixelRect, Shares, SumNode, add_share,
+};
 use crate::integrator::{BranchEnds, RayCounts};
 use crate::render::{BlockState, NonFinite, RenderState, block_origins};
 use crate::sampler::REPLICATES;
@@ -21,6 +24,7 @@ const FIRST: &str = "alhazen.stateFirst";
 const PASSED: &str = "alhazen.statePassed";
 const RAYS: &str = "alhazen.stateRays";
 const NON_FINITE: &str = "alhazen.stateNonFinite";
+const LAYERS: &str = "alhazen.stateLayers";
 
 /// Most nodes of a replicate that a file may have: a range of u32 has fewer.
 const MOST_NODES: usize = 64;
@@ -49,6 +53,8 @@ pub struct StateFile {
     pub size: [u32; 2],
     /// How far the render is.
     pub state: RenderState,
+    /// What the middles of pixels show, where the render was over and it was asked for.
+    pub center: CenterLayers,
     /// What else the header says, in alphabetical order.
     pub attributes: Vec<Attribute>,
 }
@@ -75,9 +81,13 @@ impl<'a> Placed<'a> {
         self.starts[r as usize + 1] - self.starts[r as usize]
     }
 
-    /// A node of replicate `r`.
-    fn node(&self, r: u32, slot: usize) -> Option<&'a SumNode> {
-        (slot < self.count(r)).then(|| &self.block.sums.nodes()[self.starts[r as usize] + slot])
+    /// A node of replicate `r` of the radiance, or of a layer from 1 on.
+    fn node(&self, layer: usize, r: u32, slot: usize) -> Option<&'a SumNode> {
+        let sums = match layer.checked_sub(1) {
+            None => &self.block.sums,
+            Some(layer) => &self.block.layers[layer],
+        };
+        (slot < self.count(r)).then(|| &sums.nodes()[self.starts[r as usize] + slot])
     }
 }
 
@@ -116,11 +126,23 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// The names of the channels of a node: how many samples, and of each colour the upper and lower half.
-fn names(r: u32, slot: usize) -> (String, [[String; 2]; 3]) {
-    let prefix = format!("state.r{r}.n{slot:02}");
+/// The names of the channels of a node of a layer: how many samples, and of each colour the upper and
+/// lower half.
+fn names(layer: &str, r: u32, slot: usize) -> (String, [[String; 2]; 3]) {
+    let prefix = format!("state.{layer}.r{r}.n{slot:02}");
     let sums = ["R", "G", "B"].map(|c| ["high", "low"].map(|half| format!("{prefix}.{c}.{half}")));
     (format!("{prefix}.count"), sums)
+}
+
+/// The names of what has sums: the radiance, and each layer that is a mean.
+fn layer_names(wanted: &[Aov]) -> Vec<&'static str> {
+    let means = Layers::means_of(wanted).into_iter().map(Aov::name);
+    ["radiance"].into_iter().chain(means).collect()
+}
+
+/// The names of the channels of what a pixel shows in a Cryptomatte: id and count.
+fn share_names(aov: Aov, place: usize) -> [String; 2] {
+    ["id", "count"].map(|what| format!("state.{}.k{place:04}.{what}", aov.name()))
 }
 
 /// Writes a state. `attributes` say what it is the state of.
@@ -148,22 +170,44 @@ pub fn write_state(
     let samples = |placed: &Placed<'_>, _| placed.block.sums.samples().end;
     channels.push(row("state.samples".to_owned(), Box::new(samples)));
     channels.push(row("state.target".to_owned(), Box::new(|placed, _| placed.block.target)));
-    for (r, slot) in (0..REPLICATES).flat_map(|r| (0..grid.slots(r)).map(move |slot| (r, slot))) {
-        let (count, sums) = names(r, slot);
+    let layers = &view.film.layers;
+    let replicates = (0..REPLICATES).flat_map(|r| (0..grid.slots(r)).map(move |slot| (r, slot)));
+    let nodes = layer_names(&layers.wanted).into_iter().enumerate();
+    for ((layer, of), (r, slot)) in
+        nodes.flat_map(|layer| replicates.clone().map(move |node| (layer.clone(), node)))
+    {
+        let (count, sums) = names(of, r, slot);
         let of_count = move |placed: &Placed<'_>, lane: usize| {
-            placed.node(r, slot).map_or(0, |node| node.count[lane])
+            placed.node(layer, r, slot).map_or(0, |node| node.count[lane])
         };
         channels.push(row(count, Box::new(of_count)));
         for (c, halves) in sums.into_iter().enumerate() {
             for (name, shift) in halves.into_iter().zip([32, 0]) {
                 let bits = move |placed: &Placed<'_>, lane: usize| {
-                    let sum = placed.node(r, slot).map_or(0, |node| node.sum[c][lane].to_bits());
-                    (sum >> shift) as u32
+                    let node = placed.node(layer, r, slot);
+                    (node.map_or(0, |node| node.sum[c][lane].to_bits()) >> shift) as u32
                 };
                 channels.push(row(name, Box::new(bits)));
             }
         }
     }
+    for (aov, pixels) in &layers.mattes {
+        let most = pixels.iter().map(Vec::len).max().unwrap_or(0);
+        for place in 0..most {
+            let names = share_names(*aov, place);
+            let share = move |pixel: usize| pixels[pixel].get(place).copied().unwrap_or_default();
+            let first = move |x: u32, y: u32| y as usize * window.width() as usize + x as usize;
+            let [id, count] = names;
+            channels.push(Channel::uint(id, move |[x, y], out| {
+                out.iter_mut().zip(first(x, y)..).for_each(|(out, i)| *out = share(i).0);
+            }));
+            channels.push(Channel::uint(count, move |[x, y], out| {
+                let bits = |i| u32::from_ne_bytes(share(i).1.to_ne_bytes());
+                out.iter_mut().zip(first(x, y)..).for_each(|(out, i)| *out = bits(i));
+            }));
+        }
+    }
+    channels.extend(center_channels(&layers.center, window.width()));
     let text = |name: &str, value| Attribute::new(name, AttributeValue::Text(value));
     attributes.extend([
         Attribute::new(VERSION.0, AttributeValue::Integer(VERSION.1)),
@@ -171,6 +215,7 @@ pub fn write_state(
         text(PASSED, view.passed.to_string()),
         text(RAYS, ray_text(view.rays)),
         text(NON_FINITE, non_finite_text(view.non_finite)),
+        text(LAYERS, layers.wanted.iter().map(|aov| aov.name()).collect::<Vec<_>>().join(" ")),
     ]);
     let options = ExrOptions { compression: ExrCompression::Zips, ..ExrOptions::default() };
     write_channels(path, view.film.size, &window, channels, &attributes, &options).map(drop)
@@ -210,6 +255,12 @@ pub fn read_state(path: &Path) -> Result<StateFile, ReadError> {
     let rays = parse_rays(text(RAYS)?).ok_or_else(|| unsound("its numbers of rays"))?;
     let non_finite = parse_non_finite(text(NON_FINITE)?).ok_or_else(|| unsound(NON_FINITE))?;
 
+    let layers: Option<Vec<Aov>> = text(LAYERS)?
+        .split_whitespace()
+        .map(|name| Aov::ALL.into_iter().find(|aov| aov.name() == name))
+        .collect();
+    let layers = layers.ok_or_else(|| unsound("its layers"))?;
+
     let window = window_of(file.origin, file.extent).ok_or_else(|| unsound("its window"))?;
     let plane = |name: &str| {
         let found = file.channels.iter().find(|(n, _)| n == name);
@@ -218,12 +269,14 @@ pub fn read_state(path: &Path) -> Result<StateFile, ReadError> {
     let need =
         |name: &str| plane(name).ok_or_else(|| unsound(&format!("the channel {name} is missing")));
     let (samples, targets) = (need("state.samples")?, need("state.target")?);
-    // By replicate and slot: the planes of a node.
+    // By layer, replicate and slot: the planes of a node.
     let mut planes = Vec::new();
-    for r in 0..REPLICATES {
+    for (of, r) in
+        layer_names(&layers).into_iter().flat_map(|of| (0..REPLICATES).map(move |r| (of, r)))
+    {
         let mut slots = Vec::new();
         for slot in 0..MOST_NODES {
-            let (count, sums) = names(r, slot);
+            let (count, sums) = names(of, r, slot);
             let Some(count) = plane(&count) else { break };
             let mut halves = [[[0u32; 0].as_slice(); 2]; 3];
             for (to, name) in halves.as_flattened_mut().iter_mut().zip(sums.as_flattened()) {
@@ -247,31 +300,52 @@ pub fn read_state(path: &Path) -> Result<StateFile, ReadError> {
         if range.start > range.end || targets[any] < range.end {
             return None;
         }
-        let mut list = Vec::new();
-        for (r, slots) in (0..).zip(&planes) {
-            let count = BlockSums::nodes_of_replicate(&range, r, REPLICATES);
-            for (count, sums) in slots.get(..count)? {
-                let mut node = SumNode::EMPTY;
-                for (lane, pixel) in lanes.iter().enumerate() {
-                    let Some(pixel) = *pixel else { continue };
-                    node.count[lane] = count[pixel];
-                    for (sum, [high, low]) in node.sum.iter_mut().zip(sums) {
-                        let bits = u64::from(high[pixel]) << 32 | u64::from(low[pixel]);
-                        sum[lane] = f64::from_bits(bits);
+        let mut of_layers = Vec::new();
+        for replicates in planes.chunks(REPLICATES as usize) {
+            let mut list = Vec::new();
+            for (r, slots) in (0..).zip(replicates) {
+                let count = BlockSums::nodes_of_replicate(&range, r, REPLICATES);
+                for (count, sums) in slots.get(..count)? {
+                    let mut node = SumNode::EMPTY;
+                    for (lane, pixel) in lanes.iter().enumerate() {
+                        let Some(pixel) = *pixel else { continue };
+                        node.count[lane] = count[pixel];
+                        for (sum, [high, low]) in node.sum.iter_mut().zip(sums) {
+                            let bits = u64::from(high[pixel]) << 32 | u64::from(low[pixel]);
+                            sum[lane] = f64::from_bits(bits);
+                        }
                     }
+                    list.push(node);
                 }
-                list.push(node);
             }
+            of_layers.push(BlockSums::from_nodes(range.clone(), REPLICATES, list)?);
         }
-        let sums = BlockSums::from_nodes(range, REPLICATES, list)?;
-        Some(BlockState { origin, target: targets[any], sums })
+        let sums = of_layers.remove(0);
+        Some(BlockState { origin, target: targets[any], sums, layers: of_layers })
     };
     let blocks: Option<Vec<BlockState>> = block_origins(&window).map(block).collect();
     let blocks = blocks.ok_or_else(|| unsound("sums are missing"))?;
-    let state = RenderState { window, first_sample, passed, blocks, rays, non_finite };
+    let mattes = Layers::mattes_of(&layers).into_iter().map(|aov| {
+        let mut pixels = vec![Shares::new(); window.area()];
+        for place in 0.. {
+            let [id, count] = share_names(aov, place);
+            let Some((ids, counts)) = plane(&id).zip(plane(&count)) else { break };
+            for (pixel, (id, count)) in pixels.iter_mut().zip(ids.iter().zip(counts)) {
+                let count = i32::from_ne_bytes(count.to_ne_bytes());
+                if count != 0 {
+                    add_share(pixel, *id, count);
+                }
+            }
+        }
+        (aov, pixels)
+    });
+    let mattes = mattes.collect();
+    let center = center_from(plane);
+    let state =
+        RenderState { window, first_sample, passed, blocks, rays, non_finite, layers, mattes };
     let is_ours = |a: &Attribute| a.name.starts_with(VERSION.0);
     let attributes = file.attributes.iter().filter(|a| !is_ours(a)).cloned().collect();
-    Ok(StateFile { size: file.size, state, attributes })
+    Ok(StateFile { size: file.size, state, center, attributes })
 }
 
 fn window_of(origin: [i32; 2], extent: [u32; 2]) -> Option<PixelRect> {

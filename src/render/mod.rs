@@ -2,6 +2,7 @@
 //! up, and stops where it is told to. It owns threads and order; it knows neither files nor terminals, and
 //! tells whoever asks through an [`Observer`].
 
+mod center;
 mod state;
 mod stop;
 mod tiles;
@@ -12,12 +13,13 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use self::center::center_layers;
 pub use self::state::{BlockState, RenderState, block_origins};
 use self::stop::SoFar;
 pub use self::stop::{Stop, StopRules};
-use self::tiles::{Tile, TileOutput, TileRenderer, Workspace, tiles};
+use self::tiles::{SampledLayers, Tile, TileOutput, TileRenderer, Workspace, tiles};
 use crate::accel::{RayQuery, with_accel};
-use crate::film::{Film, FilterTable, PixelRect};
+use crate::film::{Aov, Film, FilterTable, Layers, PixelRect};
 use crate::integrator::{Ao, Everything, Flat, Integrator, Local, RayCounts, Tree, Whitted};
 use crate::scene::{IntegratorKind, Scene, Variant};
 
@@ -43,6 +45,8 @@ pub struct RenderJob {
     /// About how long a pass over the picture should last, so that there is something to see or to keep
     /// as often; does not change the picture. It implies `keep_state`.
     pub pass_time: Option<Duration>,
+    /// What the picture is to hold beside colours.
+    pub layers: Vec<Aov>,
 }
 
 /// Hears how a render goes, and ends it. Called from all threads.
@@ -184,13 +188,19 @@ fn run<Q: RayQuery, I: Integrator>(
         || job.first_sample > 0
         || state.is_some();
     let filter = FilterTable::new(scene.settings.filter);
-    let renderer = TileRenderer { scene, query, integrator, filter, seed: job.seed, window };
+    let layers = SampledLayers::new(scene, &job.layers);
+    let renderer =
+        TileRenderer { scene, query, integrator, filter, seed: job.seed, window, layers };
     let mut run = Run {
         renderer,
         observer,
         film: Mutex::new(match &state {
             Some(state) => state.film(scene.size),
-            None => Film::new(scene.size, window, is_kept || rules.samples > 1),
+            None => {
+                let mut film = Film::new(scene.size, window, is_kept || rules.samples > 1);
+                film.layers = Layers::new(&job.layers, window.area());
+                film
+            }
         }),
         tiles: Vec::new(),
         totals: Mutex::new((RayCounts::default(), NonFinite::default())),
@@ -200,13 +210,16 @@ fn run<Q: RayQuery, I: Integrator>(
         passed: job.first_sample,
     };
     if is_kept {
-        let state = state.unwrap_or_else(|| RenderState::before(job.first_sample, window));
+        let state =
+            state.unwrap_or_else(|| RenderState::before(job.first_sample, window, &job.layers));
         run.restore(state);
     } else {
         run.tiles = tiles(&window).map(|at| Tile { at, blocks: Vec::new(), done: 0 }).collect();
     }
     let stop = run.until_it_is_over(&rules, is_kept, job.pass_time);
-    run.finish(stop, is_kept, rules.samples)
+    let mut rendered = run.finish(stop, is_kept, rules.samples);
+    rendered.film.layers.center = center_layers(scene, query, &window, &job.layers);
+    rendered
 }
 
 /// A render under way.
@@ -302,7 +315,8 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
             let (ended, waits) = (AtomicBool::new(false), AtomicBool::new(false));
             let this = &*self;
             let left = tiles.par_iter_mut().filter(|tile| tile.done < limit);
-            left.for_each_init(Workspace::new, |workspace, tile| {
+            let workspace = || Workspace::new(&this.renderer.layers);
+            left.for_each_init(workspace, |workspace, tile| {
                 // Tiles that have begun are finished; the others come after the look.
                 if waits.load(Ordering::Relaxed) || this.observer.wants_look() {
                     waits.store(true, Ordering::Relaxed);
@@ -331,7 +345,17 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
     fn collect(&self, output: &mut TileOutput, expected: f64) {
         {
             let mut film = self.film.lock().unwrap_or_else(PoisonError::into_inner);
-            output.blocks.iter().for_each(|block| film.put(block));
+            let (means, mattes) = (&self.renderer.layers.means, &self.renderer.layers.mattes);
+            for (number, block) in output.blocks.iter().enumerate() {
+                film.put(block);
+                let of = |n: usize| number * n..(number + 1) * n;
+                for (layer, values) in output.means[of(means.len())].iter().enumerate() {
+                    film.put_layer(layer, block.origin, values);
+                }
+                for (matte, shares) in output.mattes[of(mattes.len())].iter().enumerate() {
+                    film.add_shares(matte, block.origin, shares);
+                }
+            }
         }
         {
             let mut totals = self.totals.lock().unwrap_or_else(PoisonError::into_inner);
@@ -372,6 +396,8 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
             blocks: self.tiles.into_iter().flat_map(|tile| tile.blocks).collect(),
             rays,
             non_finite: non_finite.clone(),
+            layers: film.layers.wanted.clone(),
+            mattes: film.layers.mattes.clone(),
         });
         Rendered { film, samples, rays, non_finite, stop, state }
     }

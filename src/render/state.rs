@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::NonFinite;
 use super::tiles::{Tile, blocks, tiles};
-use crate::film::{BlockAccumulator, BlockPixels, BlockSums, Film, PixelRect};
+use crate::film::{Aov, BlockAccumulator, BlockSums, Film, Layers, PixelRect, Shares, add_share};
 use crate::integrator::RayCounts;
 use crate::sampler::REPLICATES;
 
@@ -17,6 +17,8 @@ pub struct BlockState {
     pub target: u32,
     /// The samples that it has.
     pub sums: BlockSums,
+    /// The same samples, of each layer that is a mean over them ([`Layers::means_of`]).
+    pub layers: Vec<BlockSums>,
 }
 
 impl BlockState {
@@ -41,6 +43,10 @@ pub struct RenderState {
     pub rays: RayCounts,
     /// Samples that were left out.
     pub non_finite: NonFinite,
+    /// The layers that it has.
+    pub layers: Vec<Aov>,
+    /// Cryptomattes: by pixel of the window, the ids that it shows.
+    pub mattes: Vec<(Aov, Vec<Shares>)>,
 }
 
 /// The first pixels of all blocks that touch `window`, in the order in which they are kept: tile by tile.
@@ -50,10 +56,12 @@ pub fn block_origins(window: &PixelRect) -> impl Iterator<Item = [u32; 2]> {
 
 impl RenderState {
     /// The state before sample number `first_sample`.
-    pub fn before(first_sample: u32, window: PixelRect) -> Self {
+    pub fn before(first_sample: u32, window: PixelRect, layers: &[Aov]) -> Self {
+        let layers = Layers::new(layers, window.area());
         let block = |origin| {
             let sums = BlockSums::starting_at(first_sample);
-            BlockState { origin, target: first_sample, sums }
+            let layers = vec![sums.clone(); layers.means.len()];
+            BlockState { origin, target: first_sample, sums, layers }
         };
         Self {
             window,
@@ -62,6 +70,8 @@ impl RenderState {
             blocks: block_origins(&window).map(block).collect(),
             rays: RayCounts::default(),
             non_finite: NonFinite::default(),
+            mattes: layers.mattes,
+            layers: layers.wanted,
         }
     }
 
@@ -74,9 +84,16 @@ impl RenderState {
     /// The picture of the samples so far.
     pub fn film(&self, size: [u32; 2]) -> Film {
         let mut film = Film::new(size, self.window, true);
+        film.layers = Layers::new(&self.layers, self.window.area());
+        film.layers.mattes.clone_from(&self.mattes);
         let mut sums = BlockAccumulator::new(REPLICATES);
         for block in self.blocks.iter().filter(|block| !block.sums.samples().is_empty()) {
-            film.put(&pixels(&mut sums, block));
+            sums.resume(&block.sums);
+            film.put(&sums.finish(block.origin));
+            for (layer, kept) in block.layers.iter().enumerate() {
+                sums.resume(kept);
+                film.put_layer(layer, block.origin, &sums.finish(block.origin).mean);
+            }
         }
         film
     }
@@ -93,6 +110,7 @@ impl RenderState {
             state.blocks.iter().all(|block| *block.sums.samples() == range)
         };
         if next.window != self.window
+            || next.layers != self.layers
             || mine.end != other.start
             || !is_even(self)
             || !is_even(&next)
@@ -101,10 +119,18 @@ impl RenderState {
         }
         let mut sums = BlockAccumulator::new(REPLICATES);
         for (block, next) in self.blocks.iter_mut().zip(&next.blocks) {
-            sums.resume(&block.sums);
-            sums.append(&next.sums);
-            sums.store(&mut block.sums);
+            let layers = block.layers.iter_mut().zip(&next.layers);
+            for (kept, next) in [(&mut block.sums, &next.sums)].into_iter().chain(layers) {
+                sums.resume(kept);
+                sums.append(next);
+                sums.store(kept);
+            }
             block.target = next.target;
+        }
+        for ((_, mine), (_, next)) in self.mattes.iter_mut().zip(&next.mattes) {
+            for (mine, next) in mine.iter_mut().zip(next) {
+                next.iter().for_each(|(id, count)| add_share(mine, *id, *count));
+            }
         }
         self.passed = next.passed;
         self.rays.add(&next.rays);
@@ -121,10 +147,4 @@ impl RenderState {
         };
         tiles(&self.window).map(tile).collect()
     }
-}
-
-/// The pixels of a block as its sums have them.
-fn pixels(sums: &mut BlockAccumulator, block: &BlockState) -> BlockPixels {
-    sums.resume(&block.sums);
-    sums.finish(block.origin)
 }

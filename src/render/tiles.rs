@@ -6,9 +6,13 @@ use glam::DVec2;
 
 use super::state::BlockState;
 use super::{NON_FINITE_TOLD, NonFinite, Observer};
-use crate::accel::{LANES, RayBlock, RayQuery};
-use crate::film::{BLOCK_LANES, BlockAccumulator, BlockPixels, FilterTable, PixelRect};
-use crate::integrator::{CameraBlock, Integrator, RayCounts};
+use crate::accel::{LANES, RayBlock, RayQuery, lanes_of};
+use crate::color::Rgb;
+use crate::film::{
+    Aov, BLOCK_LANES, BlockAccumulator, BlockPixels, FilterTable, Layers, PixelRect, Shares,
+    add_share, cryptomatte_id,
+};
+use crate::integrator::{CameraBlock, FirstHits, Integrator, RayCounts};
 use crate::sampler::{Dimensions, PixelSampler, REPLICATES, Sampler};
 use crate::scene::Scene;
 
@@ -57,17 +61,132 @@ pub(super) struct TileRenderer<'a, Q, I> {
     pub(super) filter: FilterTable,
     pub(super) seed: u64,
     pub(super) window: PixelRect,
+    pub(super) layers: SampledLayers,
 }
 
 /// What a thread works with; reused from tile to tile.
 pub(super) struct Workspace {
-    sums: BlockAccumulator,
+    sums: BlockSampling,
     pub(super) output: TileOutput,
 }
 
 impl Workspace {
-    pub(super) fn new() -> Self {
-        Self { sums: BlockAccumulator::new(REPLICATES), output: TileOutput::default() }
+    pub(super) fn new(layers: &SampledLayers) -> Self {
+        Self { sums: BlockSampling::new(layers), output: TileOutput::default() }
+    }
+}
+
+/// What the samples of a block add up to.
+struct BlockSampling {
+    radiance: BlockAccumulator,
+    /// Of each layer that is a mean.
+    means: Vec<BlockAccumulator>,
+    /// Of each Cryptomatte, what each pixel shows.
+    mattes: Vec<[Shares; BLOCK_LANES]>,
+}
+
+impl BlockSampling {
+    fn new(layers: &SampledLayers) -> Self {
+        let sums = || BlockAccumulator::new(REPLICATES);
+        Self {
+            radiance: sums(),
+            means: layers.means.iter().map(|_| sums()).collect(),
+            mattes: layers.mattes.iter().map(|_| Default::default()).collect(),
+        }
+    }
+
+    /// Goes on from what a block has, or from nothing.
+    fn begin(&mut self, block: Option<&BlockState>) {
+        match block {
+            None => {
+                self.radiance.restart(0);
+                self.means.iter_mut().for_each(|sums| sums.restart(0));
+            }
+            Some(block) => {
+                self.radiance.resume(&block.sums);
+                for (sums, kept) in self.means.iter_mut().zip(&block.layers) {
+                    sums.resume(kept);
+                }
+            }
+        }
+        self.mattes.iter_mut().flatten().for_each(Shares::clear);
+    }
+
+    fn store(&self, block: &mut BlockState) {
+        self.radiance.store(&mut block.sums);
+        for (sums, kept) in self.means.iter().zip(&mut block.layers) {
+            sums.store(kept);
+        }
+    }
+}
+
+fn weigh(values: &mut [Rgb; LANES], weights: &[f32; LANES]) {
+    for (value, weight) in values.iter_mut().zip(weights) {
+        *value *= *weight;
+    }
+}
+
+/// The layers that samples add to.
+pub(super) struct SampledLayers {
+    pub(super) means: Vec<Aov>,
+    pub(super) mattes: Vec<Aov>,
+    has_direct: bool,
+    has_first_hits: bool,
+    /// The ids of objects and of materials, where a matte asks for them.
+    object_ids: Vec<u32>,
+    material_ids: Vec<u32>,
+}
+
+impl SampledLayers {
+    pub(super) fn new(scene: &Scene, wanted: &[Aov]) -> Self {
+        let (means, mattes) = (Layers::means_of(wanted), Layers::mattes_of(wanted));
+        let ids = |aov, names: &[String]| {
+            let wanted = mattes.contains(&aov).then_some(names).unwrap_or_default();
+            wanted.iter().map(|name| cryptomatte_id(name)).collect()
+        };
+        Self {
+            has_direct: means.contains(&Aov::Direct),
+            has_first_hits: means.iter().any(|aov| *aov != Aov::Direct),
+            object_ids: ids(Aov::CryptoObject, scene.object_names()),
+            material_ids: ids(Aov::CryptoMaterial, scene.material_names()),
+            means,
+            mattes,
+        }
+    }
+
+    fn are_none(&self) -> bool {
+        self.means.is_empty() && self.mattes.is_empty()
+    }
+
+    /// Adds a sample of the pixels of a block.
+    #[expect(clippy::too_many_arguments, reason = "all that a sample is")]
+    fn add(
+        &self,
+        scene: &Scene,
+        sample: u32,
+        inside: u16,
+        camera: &CameraBlock<'_>,
+        direct: [Rgb; LANES],
+        weights: &[f32; LANES],
+        sums: &mut BlockSampling,
+    ) {
+        let first = self.has_first_hits.then(|| FirstHits::of(scene, camera));
+        for (aov, sums) in self.means.iter().zip(&mut sums.means) {
+            let of_first = first.as_ref().and_then(|first| first.values(*aov));
+            let mut values = *of_first.unwrap_or(&direct);
+            weigh(&mut values, weights);
+            sums.add(sample, inside, &values);
+        }
+        for (aov, pixels) in self.mattes.iter().zip(&mut sums.mattes) {
+            for lane in lanes_of(inside) {
+                let id = camera.hits.get(lane).map_or(0, |hit| match aov {
+                    Aov::CryptoObject => self.object_ids[scene.object_index(hit) as usize],
+                    _ => self.material_ids[scene.material_index(hit) as usize],
+                });
+                let count = if weights[lane] < 0.0 { -1 } else { 1 };
+                add_share(&mut pixels[lane], id, count);
+            }
+        }
     }
 }
 
@@ -75,6 +194,10 @@ impl Workspace {
 #[derive(Default)]
 pub(super) struct TileOutput {
     pub(super) blocks: Vec<BlockPixels>,
+    /// Of each block in turn, the mean of each layer.
+    pub(super) means: Vec<[Rgb; BLOCK_LANES]>,
+    /// Of each block in turn, the shares of each Cryptomatte.
+    pub(super) mattes: Vec<[Shares; BLOCK_LANES]>,
     pub(super) rays: RayCounts,
     pub(super) non_finite: NonFinite,
     /// Samples of pixels of the window that were taken.
@@ -85,6 +208,8 @@ impl TileOutput {
     /// Forgets the last tile; memory for blocks stays.
     fn restart(&mut self) {
         self.blocks.clear();
+        self.means.clear();
+        self.mattes.clear();
         self.rays = RayCounts::default();
         self.non_finite = NonFinite::default();
         self.samples = 0;
@@ -106,17 +231,17 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
         output.restart();
         if tile.blocks.is_empty() {
             return blocks(&tile.at, &self.window).all(|origin| {
-                sums.restart(0);
+                sums.begin(None);
                 self.render_block(origin, 0..limit, false, sums, output, observer)
             });
         }
         tile.blocks.iter_mut().filter(|block| block.is_behind(limit)).all(|block| {
             let to = block.target.min(limit);
-            sums.resume(&block.sums);
+            sums.begin(Some(block));
             let samples = block.sums.samples().end..to;
             let done = self.render_block(block.origin, samples, true, sums, output, observer);
             if done {
-                sums.store(&mut block.sums);
+                sums.store(block);
             }
             done
         })
@@ -129,7 +254,7 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
         origin: [u32; 2],
         samples: Range<u32>,
         is_kept: bool,
-        sums: &mut BlockAccumulator,
+        sums: &mut BlockSampling,
         output: &mut TileOutput,
         observer: &dyn Observer,
     ) -> bool {
@@ -143,7 +268,7 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             })
             .fold(0u16, |bits, lane| bits | 1 << lane);
 
-        let is_all = samples == (0..1) && !is_kept;
+        let is_all = samples == (0..1) && !is_kept && self.layers.are_none();
         let taken = samples.len() as u64;
         let pixels: [PixelSampler; LANES] =
             std::array::from_fn(|lane| PixelSampler::new(self.seed, pixel(lane)));
@@ -156,17 +281,23 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             output.rays.camera += u64::from(rays.active().count_ones());
             let hits = self.query.intersect_block(&rays);
             let camera = CameraBlock { rays: &rays, hits: &hits, samplers: &samplers };
-            let mut radiance =
-                self.integrator.shade(self.scene, self.query, &camera, &mut output.rays);
-            for (value, weight) in radiance.iter_mut().zip(weights) {
-                *value *= weight;
+            let (mut radiance, direct) = if self.layers.has_direct {
+                self.integrator.shade_split(self.scene, self.query, &camera, &mut output.rays)
+            } else {
+                let radiance =
+                    self.integrator.shade(self.scene, self.query, &camera, &mut output.rays);
+                (radiance, [Rgb::BLACK; LANES])
+            };
+            weigh(&mut radiance, &weights);
+            if !self.layers.are_none() {
+                self.layers.add(self.scene, sample, inside, &camera, direct, &weights, sums);
             }
             let dropped = if is_all {
                 let (pixels, dropped) = BlockPixels::of_one_sample(origin, inside, &radiance);
                 output.blocks.push(pixels);
                 dropped
             } else {
-                sums.add(sample, inside, &radiance)
+                sums.radiance.add(sample, inside, &radiance)
             };
             for lane in (0..LANES).filter(|lane| dropped >> lane & 1 == 1) {
                 let [x, y] = pixel(lane);
@@ -180,8 +311,10 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             }
         }
         if !is_all {
-            output.blocks.push(sums.finish(origin));
+            output.blocks.push(sums.radiance.finish(origin));
         }
+        output.means.extend(sums.means.iter_mut().map(|sums| sums.finish(origin).mean));
+        output.mattes.extend(sums.mattes.iter_mut().map(std::mem::take));
         output.samples += taken * wanted.area() as u64;
         true
     }

@@ -13,7 +13,7 @@ use super::lights::{
     Emission, add_surfaces, default_lights, glowing_objects, is_hidden, written_lights,
 };
 use super::maps::Maps;
-use super::place::{Placed, place};
+use super::place::{CopyObjects, Placed, place};
 use super::requirements::{Contents, Requirements, has_clear_shadows};
 use super::surface::SurfacePoint;
 use super::tessellate::{Tessellation, tessellate};
@@ -76,6 +76,9 @@ pub struct Scene {
     pub(super) frames: Vec<DAffine3>,
     root_looks: Vec<GeometryLooks>,
     prototype_looks: Vec<Vec<GeometryLooks>>,
+    copy_objects: Vec<CopyObjects>,
+    object_names: Vec<String>,
+    material_names: Vec<String>,
 }
 
 /// A name that stands for nothing.
@@ -339,6 +342,7 @@ impl Scene {
             clear.push(false);
             clear.extend(desc.materials.iter().map(|m| m.material.is_glass()));
         }
+        let object_names = desc.objects.iter().map(|object| object.name.clone()).collect();
         let placed = place(&mut desc, &material_names, &prototype_names, &maps, &glows, &clear);
         let placed = match placed {
             Ok(placed) if errors.is_empty() => placed,
@@ -357,7 +361,7 @@ impl Scene {
         let glowing = glowing_objects(&placed, &emissions).map_err(|e| vec![e])?;
         let has_own_light =
             !desc.lights.is_empty() || desc.ambient.is_some() || !glowing.is_empty();
-        let Placed { world, root_looks, prototype_looks, frames, center } = placed;
+        let Placed { world, root_looks, prototype_looks, copy_objects, frames, center } = placed;
 
         let volumes = placed_volumes(&desc.volumes, center);
         let bounds = volumes.iter().map(Volume::bounds).fold(world.bounds(), Bounds::union);
@@ -402,6 +406,10 @@ impl Scene {
         let light_tree = Some(LightTree::new(&lights))
             .filter(|tree| tree.len() > desc.settings.light_samples as usize);
 
+        let material_names = ["default".to_owned()]
+            .into_iter()
+            .chain(desc.materials.iter().map(|m| m.name.clone()))
+            .collect();
         let mut materials = vec![Material::Diffuse { reflectance: Rgb::splat(0.6) }];
         materials.extend(desc.materials.into_iter().map(|m| m.material));
         if maps.iter().all(Maps::is_empty) {
@@ -455,6 +463,9 @@ impl Scene {
             frames,
             root_looks,
             prototype_looks,
+            copy_objects,
+            object_names,
+            material_names,
         };
         if scene.requirements.dielectrics > 0 {
             scene.camera_interior = scene.interior_at(scene.camera.pose().eye);
@@ -480,6 +491,30 @@ impl Scene {
             }
         };
         looks[hit.geometry as usize].of(hit.primitive)
+    }
+
+    /// The number of the object that was hit, among [`Scene::object_names`]: of a copy, the one that
+    /// placed it, however deep it is nested.
+    pub fn object_index(&self, hit: &Hit) -> u32 {
+        match hit.copy {
+            None => self.look(hit).object,
+            Some(copy) => self.copy_objects[copy.set as usize].of(copy.index),
+        }
+    }
+
+    /// The number of the material that was hit, among [`Scene::material_names`].
+    pub fn material_index(&self, hit: &Hit) -> u32 {
+        self.look(hit).material
+    }
+
+    /// The names of the scene's objects; several may be called the same.
+    pub fn object_names(&self) -> &[String] {
+        &self.object_names
+    }
+
+    /// The names of its materials, of which the first is the neutral default.
+    pub fn material_names(&self) -> &[String] {
+        &self.material_names
     }
 
     /// The material of what was hit.

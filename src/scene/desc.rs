@@ -328,6 +328,8 @@ impl MaterialDesc {
 pub struct ObjectDesc {
     /// Where it was written.
     pub at: Location,
+    /// What it is called in Cryptomatte; several may be called the same.
+    pub name: String,
     /// What it is.
     pub shape: ShapeDesc,
     /// Its material; a neutral grey where not given.
@@ -343,6 +345,7 @@ impl ObjectDesc {
     pub fn new(shape: ShapeDesc, material: Option<&str>) -> Self {
         Self {
             at: Location::default(),
+            name: "object".to_owned(),
             shape,
             material: material.map(Reference::new),
             transform: DAffine3::IDENTITY,

@@ -16,6 +16,8 @@ pub(super) struct Look {
     pub(super) material: u32,
     /// Index of its texture space.
     pub(super) frame: u32,
+    /// The scene's number of the object that it belongs to; means nothing in a prototype.
+    pub(super) object: u32,
 }
 
 /// The looks of one geometry.
@@ -45,11 +47,30 @@ pub(super) struct Draft {
     /// Lists of shapes, one for each kind that there is, and what each shape looks like.
     pub(super) shapes: Vec<(Shapes, Vec<DraftLook>)>,
     /// Copies of other drafts, by index.
-    pub(super) copies: Vec<(usize, DAffine3)>,
+    pub(super) copies: Vec<DraftCopy>,
 }
 
-/// A material, and where its textures lie: texture space from the group's, none where it has none.
-pub(super) type DraftLook = (u32, Option<DAffine3>);
+/// A copy of a draft.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DraftCopy {
+    /// Which draft.
+    pub(super) draft: usize,
+    /// Where it is, in the space of what holds the copy.
+    pub(super) transform: DAffine3,
+    /// The scene's number of the object that it belongs to; means nothing in a prototype.
+    pub(super) object: u32,
+}
+
+/// What a primitive will look like.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DraftLook {
+    /// Index of its material.
+    pub(super) material: u32,
+    /// Where its textures lie: texture space from the group's; none where it has none.
+    pub(super) frame: Option<DAffine3>,
+    /// The scene's number of the object that it belongs to; means nothing in a prototype.
+    pub(super) object: u32,
+}
 
 impl Draft {
     /// The box around its own meshes and shapes, before it is moved. A mesh counts by its own box.
@@ -85,7 +106,7 @@ impl Draft {
 
     /// Parts its lists of shapes into those of materials that are `clear` and those that are not.
     fn part(&mut self, clear: &[bool]) {
-        let is_clear = |(material, _): &DraftLook| clear[*material as usize];
+        let is_clear = |look: &DraftLook| clear[look.material as usize];
         let parts = self.shapes.drain(..).flat_map(|(shapes, looks)| {
             let [others, chosen] = shapes.split(|i| is_clear(&looks[i]));
             let (of_chosen, of_others) = looks.into_iter().partition(is_clear);
@@ -108,10 +129,10 @@ impl Draft {
             self.part(clear);
         }
         let (mut geometries, mut looks) = (Vec::new(), Vec::new());
-        let mut look = |&(material, frame): &DraftLook| {
-            let Some(frame) = frame else { return Look { material, frame: 0 } };
+        let mut look = |&DraftLook { material, frame, object }: &DraftLook| {
+            let Some(frame) = frame else { return Look { material, frame: 0, object } };
             frames.push(frame * DAffine3::from_translation(origin));
-            Look { material, frame: frames.len() as u32 - 1 }
+            Look { material, frame: frames.len() as u32 - 1, object }
         };
         for (index, transform, draft_look) in &self.meshes {
             uses_left[*index] -= 1;

@@ -78,6 +78,7 @@ pub(super) fn add_surfaces(desc: &mut SceneDesc) {
         let name = format!("{HIDDEN}{index}");
         let black = Material::Diffuse { reflectance: Rgb::BLACK };
         let mut object = ObjectDesc::new(shape, None);
+        object.name = format!("light.{index}");
         object.material = Some(Reference::new(name.clone()));
         desc.objects.push(object);
         desc.materials.push(MaterialDesc { emission: radiance, ..MaterialDesc::new(name, black) });

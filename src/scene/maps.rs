@@ -168,6 +168,11 @@ impl Scene {
         }
     }
 
+    /// The texture coordinates of a hit; zero where the surface has none.
+    pub fn texture_coordinates(&self, hit: &Hit, point: &SurfacePoint<'_>) -> Vec2 {
+        self.site(hit, self.look(hit), 0.0, point).point.uv
+    }
+
     fn site(&self, hit: &Hit, look: Look, width: f32, point: &SurfacePoint<'_>) -> Site {
         let world_from_group =
             hit.copy.map(|copy| affine_from_rows(self.world.transform(copy))).unwrap_or_default();

@@ -11,7 +11,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::build::{NameIndex, SceneError};
 use super::desc::{Location, ObjectDesc, SceneDesc, ShapeDesc};
-use super::draft::{Draft, DraftLook, GeometryLooks};
+use super::draft::{Draft, DraftCopy, DraftLook, GeometryLooks};
 use super::maps::Maps;
 use crate::accel::{InstanceSet, World, rows_from_affine};
 use crate::geometry::{Plane, TriangleMesh};
@@ -24,11 +24,38 @@ pub(super) struct Placed {
     /// The looks of every geometry of the root group and of each prototype, in the world's order.
     pub(super) root_looks: Vec<GeometryLooks>,
     pub(super) prototype_looks: Vec<Vec<GeometryLooks>>,
+    /// The objects that the copies of each set belong to.
+    pub(super) copy_objects: Vec<CopyObjects>,
     /// Where textures lie: texture space from the group's. The first is the identity; there are no
     /// others where no material has a texture.
     pub(super) frames: Vec<DAffine3>,
     /// What was subtracted from all world coordinates.
     pub(super) center: DVec3,
+}
+
+/// The numbers of the objects that the copies of a set belong to.
+#[derive(Debug)]
+pub(super) enum CopyObjects {
+    /// All to one.
+    One(u32),
+    /// By copy.
+    Each(Vec<u32>),
+}
+
+impl CopyObjects {
+    fn new(objects: Vec<u32>) -> Self {
+        match objects.first() {
+            Some(first) if objects.iter().all(|object| object == first) => Self::One(*first),
+            _ => Self::Each(objects),
+        }
+    }
+
+    pub(super) fn of(&self, copy: u32) -> u32 {
+        match self {
+            Self::One(object) => *object,
+            Self::Each(objects) => objects[copy as usize],
+        }
+    }
 }
 
 /// Identity of a draft that several objects may share: what it holds, its material and, where that has
@@ -128,7 +155,8 @@ pub(super) fn place(
         world_bounds = world_bounds.union(volume.bounds());
     }
     for (b, transforms) in bounds.iter().zip(&copies) {
-        world_bounds = transforms.iter().fold(world_bounds, |w, m| w.union(b.transformed(m)));
+        let around = |w: Bounds, (m, _): &(DAffine3, u32)| w.union(b.transformed(m));
+        world_bounds = transforms.iter().fold(world_bounds, around);
     }
     let center = world_bounds.far_center();
     let errors = out_of_range(&world_bounds.translated(-center), &bounds);
@@ -139,7 +167,7 @@ pub(super) fn place(
     let mut placed = Placed { center, frames: vec![DAffine3::IDENTITY], ..Placed::default() };
     // A draft of nothing but copies is no group of its own.
     let has_shapes = |d: &Draft| !d.meshes.is_empty() || !d.shapes.is_empty();
-    let used = |d: &Draft, c: &[DAffine3]| !c.is_empty() && has_shapes(d);
+    let used = |d: &Draft, c: &[(DAffine3, u32)]| !c.is_empty() && has_shapes(d);
     let mut uses_left = vec![0u32; meshes.len()];
     let kept = drafts.iter().zip(&copies).filter(|(d, c)| used(d, c)).map(|(d, _)| d);
     for (mesh, ..) in kept.chain([&root]).flat_map(|d| &d.meshes) {
@@ -155,7 +183,7 @@ pub(super) fn place(
         }
         let origin = bounds.far_center();
         let (group, looks) = group(draft, origin);
-        let rows = transforms.iter().map(|m| {
+        let rows = transforms.iter().map(|(m, _)| {
             let centred =
                 DAffine3::from_translation(-center) * *m * DAffine3::from_translation(origin);
             rows_from_affine(&centred)
@@ -164,6 +192,8 @@ pub(super) fn place(
             prototype: placed.world.prototypes.len() as u32,
             transforms: Arc::new(rows.collect()),
         });
+        let objects = transforms.iter().map(|(_, object)| *object).collect();
+        placed.copy_objects.push(CopyObjects::new(objects));
         placed.world.prototypes.push(group);
         placed.prototype_looks.push(looks);
     }
@@ -173,7 +203,7 @@ pub(super) fn place(
 impl Placer<'_> {
     fn draft(&mut self, objects: Vec<ObjectDesc>, depth: usize) -> Draft {
         let mut draft = Draft::default();
-        for object in objects {
+        for (number, object) in (0..).zip(objects) {
             let material = match &object.material {
                 // Index 0 is the neutral default.
                 None => 0,
@@ -197,7 +227,8 @@ impl Placer<'_> {
             let look = |object_from_group: &DAffine3| -> DraftLook {
                 let has_maps = !self.maps[material as usize].is_empty();
                 let textures = object.texture_transform.inverse();
-                (material, has_maps.then(|| textures * *object_from_group))
+                let frame = has_maps.then(|| textures * *object_from_group);
+                DraftLook { material, frame, object: number }
             };
             let has_uvs = match object.shape {
                 ShapeDesc::Mesh(mesh) => self.has_uvs[mesh],
@@ -221,7 +252,8 @@ impl Placer<'_> {
                         ..Draft::default()
                     };
                     let shared = self.share(Shared::Mesh(mesh, material, bits(&look)), only);
-                    self.copy(&mut draft, shared, m, &object);
+                    let copy = DraftCopy { draft: shared, transform: m, object: number };
+                    self.copy(&mut draft, copy, &object);
                 }
                 ShapeDesc::Instances { ref prototype, ref transforms } => {
                     let index = match self.prototype_names.find(prototype, "prototype") {
@@ -243,9 +275,11 @@ impl Placer<'_> {
                         continue;
                     }
                     match self.prototype(index, depth + 1) {
-                        Some(shared) => {
-                            draft.copies.extend(transforms.iter().map(|t| (shared, m * *t)))
-                        }
+                        Some(shared) => draft.copies.extend(transforms.iter().map(|t| DraftCopy {
+                            draft: shared,
+                            transform: m * *t,
+                            object: number,
+                        })),
                         None => self.errors.push(SceneError::PrototypeCycle {
                             at: prototype.at.clone(),
                             name: prototype.name.clone(),
@@ -264,9 +298,9 @@ impl Placer<'_> {
     }
 
     /// Adds a copy that stands for one object.
-    fn copy(&mut self, draft: &mut Draft, shared: usize, m: DAffine3, object: &ObjectDesc) {
-        match check_row(&m, 0, object) {
-            Ok(()) => draft.copies.push((shared, m)),
+    fn copy(&mut self, draft: &mut Draft, copy: DraftCopy, object: &ObjectDesc) {
+        match check_row(&copy.transform, 0, object) {
+            Ok(()) => draft.copies.push(copy),
             Err(error) => self.errors.push(error),
         }
     }
@@ -293,7 +327,7 @@ impl Placer<'_> {
 
 /// What tells one texture space from another.
 fn bits(look: &DraftLook) -> Option<[u64; 12]> {
-    look.1.map(|frame| frame.to_cols_array().map(f64::to_bits))
+    look.frame.map(|frame| frame.to_cols_array().map(f64::to_bits))
 }
 
 /// Whether points on a shape can be drawn at random, as light sources need.
@@ -327,17 +361,22 @@ fn check_row(m: &DAffine3, row: usize, object: &ObjectDesc) -> Result<(), SceneE
     }
 }
 
-/// World from draft for every copy of every draft, nested ones included: one level instead of many.
-fn flatten(root: &Draft, drafts: &[Draft]) -> Result<Vec<Vec<DAffine3>>, SceneError> {
+/// World from draft for every copy of every draft, nested ones included, and the scene's object that it
+/// belongs to: one level instead of many.
+fn flatten(root: &Draft, drafts: &[Draft]) -> Result<Vec<Vec<(DAffine3, u32)>>, SceneError> {
     let count = count_copies(root, drafts);
     if count > MAX_COPIES {
         return Err(SceneError::TooManyCopies { count, limit: MAX_COPIES });
     }
-    let mut copies: Vec<Vec<DAffine3>> = vec![Vec::new(); drafts.len()];
-    let mut pending: Vec<(usize, DAffine3)> = root.copies.clone();
-    while let Some((draft, transform)) = pending.pop() {
-        copies[draft].push(transform);
-        pending.extend(drafts[draft].copies.iter().map(|(d, m)| (*d, transform * *m)));
+    let mut copies = vec![Vec::new(); drafts.len()];
+    let mut pending = root.copies.clone();
+    while let Some(DraftCopy { draft, transform, object }) = pending.pop() {
+        copies[draft].push((transform, object));
+        pending.extend(drafts[draft].copies.iter().map(|copy| DraftCopy {
+            draft: copy.draft,
+            transform: transform * copy.transform,
+            object,
+        }));
     }
     // The stack reversed their order.
     copies.iter_mut().for_each(|c| c.reverse());
@@ -345,12 +384,12 @@ fn flatten(root: &Draft, drafts: &[Draft]) -> Result<Vec<Vec<DAffine3>>, SceneEr
 }
 
 /// Planes have no end, so that no box is around a copy of one: each copy becomes a plane of the world.
-fn lift_planes(root: &mut Draft, drafts: &mut [Draft], copies: &[Vec<DAffine3>]) {
+fn lift_planes(root: &mut Draft, drafts: &mut [Draft], copies: &[Vec<(DAffine3, u32)>]) {
     for (draft, transforms) in drafts.iter_mut().zip(copies) {
-        for (plane, (material, frame)) in draft.take::<Plane>() {
-            for m in transforms {
-                let look = (material, frame.map(|frame| frame * m.inverse()));
-                root.add(plane.transformed(m), look);
+        for (plane, look) in draft.take::<Plane>() {
+            for (m, object) in transforms {
+                let frame = look.frame.map(|frame| frame * m.inverse());
+                root.add(plane.transformed(m), DraftLook { frame, object: *object, ..look });
             }
         }
     }
@@ -378,7 +417,8 @@ fn count_copies(root: &Draft, drafts: &[Draft]) -> u64 {
     // A draft is made after those that it copies, so their counts are known.
     let mut below: Vec<u64> = Vec::with_capacity(drafts.len());
     let count = |draft: &Draft, below: &[u64]| {
-        draft.copies.iter().fold(0u64, |n, (d, _)| n.saturating_add(1).saturating_add(below[*d]))
+        let one = |n: u64, c: &DraftCopy| n.saturating_add(1).saturating_add(below[c.draft]);
+        draft.copies.iter().fold(0, one)
     };
     for draft in drafts {
         below.push(count(draft, &below));

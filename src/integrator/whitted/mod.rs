@@ -214,8 +214,39 @@ impl<F: Features> Integrator for Whitted<F> {
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
     ) -> [Rgb; LANES] {
+        self.trace(scene, query, camera, counts, None)
+    }
+
+    fn shade_split<Q: RayQuery>(
+        &self,
+        scene: &Scene,
+        query: &Q,
+        camera: &CameraBlock<'_>,
+        counts: &mut RayCounts,
+    ) -> ([Rgb; LANES], [Rgb; LANES]) {
+        let mut direct = [Rgb::BLACK; LANES];
+        let radiance = self.trace(scene, query, camera, counts, Some(&mut direct));
+        (radiance, direct)
+    }
+}
+
+impl<F: Features> Whitted<F> {
+    /// The radiance along camera rays, and the part of it that is `direct` where that is asked for.
+    #[inline]
+    fn trace<Q: RayQuery>(
+        &self,
+        scene: &Scene,
+        query: &Q,
+        camera: &CameraBlock<'_>,
+        counts: &mut RayCounts,
+        direct: Option<&mut [Rgb; LANES]>,
+    ) -> [Rgb; LANES] {
         if !F::TREE {
-            return local::shade(scene, query, camera, counts);
+            let radiance = local::shade(scene, query, camera, counts);
+            if let Some(direct) = direct {
+                *direct = radiance;
+            }
+            return radiance;
         }
         let mut walk = Walk::<Q, F> {
             scene,
@@ -248,12 +279,14 @@ impl<F: Features> Integrator for Whitted<F> {
             walk.before_the_scene(&mut nodes);
         }
         walk.shade(camera.rays.active(), &nodes, |lane| camera.hits.get(lane));
-        if F::TREE {
-            walk.run();
-        }
         for lane in (0..LANES).filter(|lane| camera.rays.active() >> lane & 1 == 0) {
             walk.radiance[lane] = scene.background;
         }
+        // All that follows has bounced.
+        if let Some(direct) = direct {
+            *direct = walk.radiance;
+        }
+        walk.run();
         walk.radiance
     }
 }

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
-use super::document::{Document, Node};
+use super::document::{Document, Node, Value};
 use super::fields::{Fields, Reader};
 use super::grid::SampleLayout;
 use super::mesh::{NonFinite, read_mesh};
@@ -190,11 +190,18 @@ impl<'d, 'r> Interpreter<'d, 'r> {
 
     fn objects(&mut self, node: &'d Node) -> Vec<ObjectDesc> {
         let nodes = self.reader.list(node, "objects");
-        nodes
-            .iter()
-            .filter_map(|node| self.reader.table(node, "[[objects]]"))
-            .filter_map(|fields| self.object(fields))
-            .collect()
+        let tables = nodes.iter().filter_map(|node| self.reader.table(node, "[[objects]]"));
+        let tables: Vec<Fields<'d, 'r>> = tables.collect();
+        let mut named = HashMap::new();
+        let objects = tables.into_iter().filter_map(|fields| {
+            let is_named = fields.has("name");
+            let mut object = self.object(fields)?;
+            if !is_named {
+                number_name(&mut object.name, &mut named);
+            }
+            Some(object)
+        });
+        objects.collect()
     }
 
     fn object(&mut self, fields: Fields<'d, 'r>) -> Option<ObjectDesc> {
@@ -237,13 +244,18 @@ impl<'d, 'r> Interpreter<'d, 'r> {
             let transform = fields.get(name).and_then(|node| transform(self.reader, node, name));
             transform.unwrap_or(DAffine3::IDENTITY)
         };
+        let name = match fields.get("name") {
+            Some(node) => fields.text(node, "name").map(str::to_owned),
+            None => Some(default_name(node)),
+        };
         let own = steps("transform");
         // The objects of a prototype have theirs.
         let texture_transform =
             if kind == "instance" { DAffine3::IDENTITY } else { steps("texture_transform") };
         fields.finish();
         let transform = own;
-        desc.map(|shape| ObjectDesc { at, shape, material, transform, texture_transform })
+        let name = name.unwrap_or_default();
+        desc.map(|shape| ObjectDesc { at, name, shape, material, transform, texture_transform })
     }
 
     pub(super) fn mesh_file(&mut self, fields: &Fields<'d, 'r>, node: &'d Node) -> Option<usize> {
@@ -282,5 +294,25 @@ impl<'d, 'r> Interpreter<'d, 'r> {
                 None
             }
         }
+    }
+}
+
+/// What an object is called that has no name: as its shape, its prototype or its mesh's file.
+fn default_name(kind: &Node) -> String {
+    match &kind.value {
+        Value::String(text) => {
+            let stem = Path::new(text.as_str()).file_stem();
+            stem.map_or_else(|| "object".to_owned(), |stem| stem.to_string_lossy().into_owned())
+        }
+        _ => "object".to_owned(),
+    }
+}
+
+/// Tells names apart that several objects have: "sphere", "sphere.2", "sphere.3".
+fn number_name(name: &mut String, named: &mut HashMap<String, u32>) {
+    let count = named.entry(name.clone()).or_insert(0);
+    *count += 1;
+    if *count > 1 {
+        *name = format!("{name}.{count}");
     }
 }
