@@ -101,6 +101,14 @@ fn parts_on_any_threads_merge_to_the_same_file() {
     let output = alhazen(folder, &arguments);
     assert!(output.status.success(), "{}", stderr(&output));
     same(folder, "one.exr", "merged.exr");
+    // So do layers.
+    render(folder, "-q -o layers.exr --layers all");
+    for part in 1..=3 {
+        render(folder, &format!("-q --part {part}/3 -o l{part}.exr --layers all"));
+    }
+    let output = alhazen(folder, &["merge", "l3.exr", "l1.exr", "l2.exr", "-q", "-o", "all.exr"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    same(folder, "layers.exr", "all.exr");
     // Crops keep their window.
     render(folder, "-q -o crop.exr --crop 31,7,90,64");
     for part in 1..=2 {
@@ -171,7 +179,7 @@ fn broken_states_are_errors() {
 fn kills_lose_nothing_but_time() {
     let kills = if verify() { 30 } else { 3 };
     // Stops by the number of samples and by the error are the same as without a pause.
-    for rule in ["--samples 900", "--samples 100000 --error 0.8%"] {
+    for rule in ["--samples 600 --layers all", "--samples 100000 --error 0.8%"] {
         let folder = folder();
         let folder = folder.path();
         render(folder, &format!("-q -o whole.exr {rule}"));
