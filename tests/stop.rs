@@ -4,7 +4,6 @@
 use std::path::Path;
 
 use alhazen::accel::AccelKind;
-use alhazen::film::Film;
 use alhazen::io::{LoadOptions, load_scene};
 use alhazen::render::{RenderJob, Rendered, Stop, StopRules, render};
 use alhazen::scene::Scene;
@@ -58,20 +57,6 @@ fn rendered(scene: &Scene, seed: u64, stop: StopRules) -> Rendered {
     render(scene, &RenderJob { seed, stop: Some(stop), ..RenderJob::default() }, &())
 }
 
-/// Relative error of a picture against another, as the film states it.
-fn true_error(film: &Film, reference: &Film) -> f64 {
-    let n = film.mean.len() as f64;
-    let luminance = film.mean.iter().map(|c| f64::from(c.luminance())).sum::<f64>() / n;
-    let epsilon = 0.01 * luminance * luminance;
-    let share = |(a, b): (f32, f32)| {
-        let (a, b) = (f64::from(a), f64::from(b));
-        (a - b).powi(2) / (b * b + epsilon)
-    };
-    let channels = film.mean.iter().zip(&reference.mean);
-    let channels = channels.flat_map(|(a, b)| a.to_array().into_iter().zip(b.to_array()));
-    (channels.map(share).sum::<f64>() / (3.0 * n)).sqrt()
-}
-
 #[test]
 fn an_error_that_is_asked_for_is_reached_and_true() {
     let scene = scene();
@@ -88,7 +73,7 @@ fn an_error_that_is_asked_for_is_reached_and_true() {
             assert!(error <= wanted, "{error} of {wanted}");
             assert!((8..4096).contains(&found.samples), "{}", found.samples);
             stated += error * error;
-            shown += true_error(&found.film, &reference).powi(2);
+            shown += found.film.error_against(&reference).powi(2);
         }
         let ratio: f64 = (stated / shown).sqrt();
         assert!((0.85..1.18).contains(&ratio), "stated by shown at {wanted}: {ratio}");
@@ -111,6 +96,25 @@ fn a_render_in_passes_is_that_of_its_samples() {
         assert_eq!(other.film.standard_error, passes.film.standard_error);
         assert_eq!(other.film.relative_error(), passes.film.relative_error());
     }
+}
+
+#[test]
+fn adaptive_samples_depend_on_nothing_but_the_scene() {
+    let scene = scene();
+    let rules = StopRules { samples: 1 << 14, error: Some(0.02), deadline: None };
+    let job = RenderJob { seed: 3, stop: Some(rules), is_adaptive: true, ..RenderJob::default() };
+    let found = render(&scene, &job, &());
+    assert_eq!(found.stop, Stop::Error);
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let alone = one_thread.install(|| render(&scene, &job, &()));
+    assert_eq!((alone.samples, alone.film.mean), (found.samples, found.film.mean));
+    let state = found.state.unwrap();
+    let counts = state.blocks.iter().map(|block| block.sums.samples().len());
+    let (least, most) = (counts.clone().min().unwrap(), counts.max().unwrap());
+    assert!(least >= 16 && 2 * least < most, "{least} {most}");
+    assert!((least..most).contains(&(found.samples as usize)));
+    // No block is left far behind.
+    assert!(8 * (least + 4) >= most / 2, "{least} {most}");
 }
 
 #[test]

@@ -167,6 +167,11 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     pub(super) time: Option<Duration>,
 
+    /// More samples where the error is, as --error or --time allow; the number of samples then is a mean.
+    /// May shift the picture a little: docs/scene.md says how much
+    #[arg(long, conflicts_with = "part")]
+    pub(super) adaptive: bool,
+
     /// Keeps how far the render is, about this often and when it is interrupted, beside the first output
     /// file (NAME.checkpoint.exr); removed once that is written
     #[arg(long, value_name = "TIME", value_parser = parse_time)]

@@ -40,6 +40,10 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     let quiet = args.scene.quiet;
     let outputs = outputs(args)?;
     check_format(&args.format)?;
+    if args.adaptive && args.error.is_none() && args.time.is_none() {
+        let message = "--adaptive needs something to reach; accepted with --error or --time";
+        return Err(Failure::BadInput(message.to_owned()));
+    }
     let layers = layers(args, &outputs)?;
     let checkpoint =
         (args.checkpoint.is_some() || args.resume).then(|| checkpoint_path(&outputs[0].path));
@@ -79,9 +83,10 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         first_sample: part.as_ref().map_or(0, |(_, range)| range.start),
         keep_state: is_kept,
         pass_time: checkpoint.as_ref().map(|_| every),
+        is_adaptive: args.adaptive,
         layers,
     };
-    let mut identity = report::identity(&scene, hash, args.seed);
+    let mut identity = report::identity(&scene, hash, args.seed, args.adaptive);
     identity.extend(report::of_layers(&scene, &job.layers));
     if let Some((part, _)) = part {
         identity.extend(part_attributes(part, samples));

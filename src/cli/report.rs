@@ -158,7 +158,12 @@ fn plural(n: u32, what: &str) -> String {
 
 /// What the header of an EXR says of how the picture is made: renders of which all this is equal can be
 /// joined. Nothing that changes from run to run.
-pub(super) fn identity(scene: &Scene, scene_hash: u64, seed: u64) -> Vec<Attribute> {
+pub(super) fn identity(
+    scene: &Scene,
+    scene_hash: u64,
+    seed: u64,
+    is_adaptive: bool,
+) -> Vec<Attribute> {
     let text = |name, value| Attribute::new(name, AttributeValue::Text(value));
     let settings = &scene.settings;
     let accel = scene.accel.info();
@@ -175,7 +180,7 @@ pub(super) fn identity(scene: &Scene, scene_hash: u64, seed: u64) -> Vec<Attribu
             "alhazen.packetWidth",
             AttributeValue::Integer(i32::try_from(accel.packet_width).unwrap_or(i32::MAX)),
         ),
-        text("alhazen.bias", biasing_options(scene)),
+        text("alhazen.bias", biasing_options(scene, is_adaptive)),
         Attribute::new("alhazen.origin", AttributeValue::Vector(scene.center.as_vec3().to_array())),
     ]
 }
@@ -211,9 +216,12 @@ pub(super) fn outcome(film: &Film, samples: u32, stop: Stop) -> Vec<Attribute> {
 }
 
 /// The options that shift the picture systematically, which the stated error does not cover.
-fn biasing_options(scene: &Scene) -> String {
+fn biasing_options(scene: &Scene, is_adaptive: bool) -> String {
     let settings = &scene.settings;
     let mut list = vec![format!("precision={}", settings.precision.name())];
+    if is_adaptive {
+        list.push("adaptive=true".to_owned());
+    }
     if let Epsilon::Fixed(epsilon) = settings.epsilon {
         list.push(format!("epsilon={epsilon}"));
     }

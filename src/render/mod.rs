@@ -2,6 +2,7 @@
 //! up, and stops where it is told to. It owns threads and order; it knows neither files nor terminals, and
 //! tells whoever asks through an [`Observer`].
 
+mod adaptive;
 mod center;
 mod state;
 mod stop;
@@ -13,6 +14,7 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use self::adaptive::{Budget, set_targets};
 use self::center::center_layers;
 pub use self::state::{BlockState, RenderState, block_origins};
 use self::stop::SoFar;
@@ -47,6 +49,9 @@ pub struct RenderJob {
     pub pass_time: Option<Duration>,
     /// What the picture is to hold beside colours.
     pub layers: Vec<Aov>,
+    /// Whether pixels have more samples where the error is, which takes a rule other than their number to
+    /// end the render.
+    pub is_adaptive: bool,
 }
 
 /// Hears how a render goes, and ends it. Called from all threads.
@@ -208,6 +213,7 @@ fn run<Q: RayQuery, I: Integrator>(
         rays_done: AtomicU64::new(0),
         first_sample: job.first_sample,
         passed: job.first_sample,
+        is_adaptive: job.is_adaptive && rules.look_at_the_film(),
     };
     if is_kept {
         let state =
@@ -235,6 +241,7 @@ struct Run<'a, Q, I> {
     first_sample: u32,
     /// Number of the sample at which the last finished pass ended.
     passed: u32,
+    is_adaptive: bool,
 }
 
 impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
@@ -267,6 +274,9 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
         }
         let mut so_far = SoFar { samples: self.passed, ..SoFar::NOTHING };
         loop {
+            if self.is_adaptive && self.passed >= adaptive::LEAST {
+                return self.adaptively(rules, so_far);
+            }
             // Where a pass was cut short, it goes to where it was to go, unless less is asked for now.
             let mut target = self.blocks().map(|block| block.target).max().unwrap_or(0);
             let most = self.blocks().map(|block| block.sums.samples().end).max().unwrap_or(0);
@@ -304,6 +314,54 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
                 }
             }
             self.passed = target;
+        }
+    }
+
+    /// From the first few samples on: goes on where the error is.
+    fn adaptively(&mut self, rules: &StopRules, mut so_far: SoFar) -> Stop {
+        let area = self.renderer.window.area() as f64;
+        loop {
+            if !self.blocks().any(|block| block.is_behind(u32::MAX)) {
+                let film = self.film.get_mut().unwrap_or_else(PoisonError::into_inner);
+                so_far.error = film.relative_error();
+                if let Some((wanted, error)) = rules.error.zip(so_far.error)
+                    && error <= wanted
+                {
+                    return Stop::Error;
+                }
+                let Some(shares) = film.block_shares() else { return Stop::Samples };
+                let left = rules.deadline.map(|at| at.saturating_duration_since(Instant::now()));
+                let budget = Budget {
+                    error: rules.error,
+                    samples: rules.samples,
+                    time: left.map(|left| (left, so_far.per_sample)),
+                };
+                let window = self.renderer.window;
+                let blocks = self.tiles.iter_mut().flat_map(|tile| &mut tile.blocks);
+                if !set_targets(blocks, &shares, &window, &budget) {
+                    let is_full = self.blocks().all(|block| block.target >= rules.samples);
+                    return if is_full { Stop::Samples } else { Stop::Time };
+                }
+            }
+            let (clock, before) = (Instant::now(), *self.samples_done.get_mut());
+            let to_come: u64 = self
+                .blocks()
+                .map(|block| {
+                    let samples = u64::from(block.target - block.sums.samples().end);
+                    samples * tiles::block_in(&self.renderer.window, block.origin).area() as u64
+                })
+                .sum();
+            self.tiles.iter_mut().for_each(|tile| tile.done = 0);
+            let expected = (before + to_come) as f64 / area;
+            if !self.pass(u32::MAX, expected) {
+                return Stop::Interrupted;
+            }
+            let taken = *self.samples_done.get_mut() - before;
+            if taken > 0 {
+                so_far.per_sample = clock.elapsed().mul_f64(area / taken as f64);
+            }
+            let least = self.blocks().map(|block| block.sums.samples().end).min();
+            self.passed = least.unwrap_or(self.passed);
         }
     }
 
@@ -385,7 +443,15 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
     fn finish(self, stop: Stop, is_kept: bool, samples: u32) -> Rendered {
         let (rays, non_finite) = self.totals.into_inner().unwrap_or_else(PoisonError::into_inner);
         let mut film = self.film.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let samples = if is_kept { (self.passed - self.first_sample).max(1) } else { samples };
+        let samples = if self.is_adaptive {
+            // The mean over pixels.
+            let all = self.samples_done.into_inner() as f64;
+            (all / film.window.area() as f64).round().max(1.0) as u32
+        } else if is_kept {
+            (self.passed - self.first_sample).max(1)
+        } else {
+            samples
+        };
         if samples == 1 {
             film.standard_error = None;
         }

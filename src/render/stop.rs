@@ -143,7 +143,7 @@ impl SoFar {
 
 /// 1, 2, 4, and from there on multiples of the replicates, an eighth of the last power of two apart: few
 /// nodes of the tree of sums are then open.
-fn barrier_after(done: u32) -> u32 {
+pub(super) fn barrier_after(done: u32) -> u32 {
     let each = done / REPLICATES;
     if each == 0 {
         return (2 * done).clamp(1, REPLICATES);
@@ -153,7 +153,7 @@ fn barrier_after(done: u32) -> u32 {
 }
 
 /// The last such count that is not above `most`; at least the next one.
-fn last_barrier(done: u32, most: f64) -> u32 {
+pub(super) fn last_barrier(done: u32, most: f64) -> u32 {
     let mut to = barrier_after(done);
     loop {
         let further = barrier_after(to);
