@@ -186,6 +186,18 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "K/N", value_parser = parse_part, conflicts_with_all = ["error", "time"])]
     pub(super) part: Option<Part>,
 
+    /// Shows the picture in tev while it is rendered, as in localhost:14158
+    #[arg(long, value_name = "HOST:PORT")]
+    pub(super) tev: Option<String>,
+
+    /// Writes the picture so far as PNG, again and again
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) preview: Option<PathBuf>,
+
+    /// How often that is
+    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = parse_time)]
+    pub(super) preview_every: Duration,
+
     /// Layers of EXR files beside the colours: all, or names separated by commas; see docs/output.md
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = layer_names())]
     pub(super) layers: Vec<LayerName>,

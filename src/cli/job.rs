@@ -3,22 +3,24 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
 use super::args::{LayerName, RenderArgs, SceneArgs};
 use super::keep::{
-    CHECKPOINT_EVERY, Keeper, Watch, checkpoint_path, part_attributes, part_range,
-    resuming_command, write_end,
+    CHECKPOINT_EVERY, Keeper, checkpoint_path, part_attributes, part_range, resuming_command,
+    write_end,
 };
 use super::outputs::{Output, check_format, check_targets, write_all};
 use super::progress::{Progress, catch_interrupts, interrupted};
 use super::units::Part;
+use super::watch::{Schedule, TEV_EVERY, View, Watch};
 use super::{Failure, Outcome, print, report, tell};
 use crate::accel::{AccelError, AccelKind, BuildOptions, Compact};
 use crate::film::{Aov, PixelRect};
-use crate::io::{ExrCompression, LoadOptions, LoadedScene, available_memory, load_scene};
+use crate::io::{ExrCompression, LoadOptions, LoadedScene, TevImage, available_memory, load_scene};
 use crate::render::{RenderJob, Rendered, Stop, StopRules, resume};
 use crate::scene::{RenderSettings, Scene, SceneError};
 
@@ -45,9 +47,13 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         return Err(Failure::BadInput(message.to_owned()));
     }
     let layers = layers(args, &outputs)?;
+    if !args.preview.as_ref().is_none_or(|path| path.extension().is_some_and(|e| e == "png")) {
+        return Err(Failure::BadInput("--preview must end in .png".to_owned()));
+    }
     let checkpoint =
         (args.checkpoint.is_some() || args.resume).then(|| checkpoint_path(&outputs[0].path));
-    let targets = outputs.iter().map(|o| &o.path).chain(&args.stats).chain(&checkpoint);
+    let pictures = outputs.iter().map(|o| &o.path).chain(&args.preview);
+    let targets = pictures.chain(&args.stats).chain(&checkpoint);
     check_targets([args.scene.scene.as_path()], targets)?;
     catch_interrupts();
     let mut phases = Phases::default();
@@ -61,10 +67,11 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     let crop = args.crop.map(|crop| check_crop(crop, size)).transpose()?;
     let window = crop.unwrap_or(PixelRect::whole(size));
     let part = args.part.map(|part| Ok((part, check_part(part, samples)?))).transpose()?;
-    let is_kept =
-        args.error.is_some() || args.time.is_some() || checkpoint.is_some() || part.is_some();
+    let looks = args.tev.is_some() || args.preview.is_some() || checkpoint.is_some();
+    let is_kept = args.error.is_some() || args.time.is_some() || part.is_some() || looks;
     let film = film_bytes(&window, is_kept);
     check_memory(size, film)?;
+    let views = views(args, &outputs, size)?;
 
     let clock = Instant::now();
     let scene = pool.install(|| build(&args.scene, args.accel.kind, loaded, film))?;
@@ -82,7 +89,14 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         stop,
         first_sample: part.as_ref().map_or(0, |(_, range)| range.start),
         keep_state: is_kept,
-        pass_time: checkpoint.as_ref().map(|_| every),
+        pass_time: [
+            checkpoint.as_ref().map(|_| every),
+            args.tev.as_ref().map(|_| TEV_EVERY),
+            args.preview.as_ref().map(|_| args.preview_every),
+        ]
+        .into_iter()
+        .flatten()
+        .min(),
         is_adaptive: args.adaptive,
         layers,
     };
@@ -91,9 +105,9 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     if let Some((part, _)) = part {
         identity.extend(part_attributes(part, samples));
     }
-    let keeper = checkpoint.map(|path| Keeper::new(path, every, identity.clone()));
+    let keeper = checkpoint.map(|path| (Schedule::new(every), Keeper::new(path, identity.clone())));
     let state = match keeper.as_ref().filter(|_| args.resume) {
-        Some(keeper) => pool.install(|| keeper.read(job.first_sample, window, size))?,
+        Some((_, keeper)) => pool.install(|| keeper.read(job.first_sample, window, size))?,
         None => None,
     };
     if let Some(state) = state.as_ref().filter(|_| !quiet) {
@@ -101,14 +115,15 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         print(&format!("{:>10}  from {samples} samples of every pixel", "goes on"));
     }
     let clock = Instant::now();
-    let watch = Watch { progress: Progress::new(quiet, "render"), keeper };
+    let watch = Watch { progress: Progress::new(quiet, "render"), keeper, views };
     let mut rendered = pool.install(|| resume(&scene, &job, state, &watch));
     watch.progress.finish();
     phases.render = clock.elapsed().as_secs_f64();
 
     let clock = Instant::now();
+    watch.views.iter().for_each(|(_, view)| view.show(&rendered.film));
     let is_interrupted = rendered.stop == Stop::Interrupted;
-    if let Some(keeper) = watch.keeper.as_ref().filter(|_| is_interrupted) {
+    if let Some((_, keeper)) = watch.keeper.as_ref().filter(|_| is_interrupted) {
         // The picture is written all the same.
         match pool.install(|| keeper.keep_end(&rendered)) {
             Ok(()) => tell(&format!("to go on: {}", resuming_command())),
@@ -137,7 +152,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     phases.write = clock.elapsed().as_secs_f64();
     phases.total = start.elapsed().as_secs_f64();
     written?;
-    if let Some(keeper) = watch.keeper.as_ref().filter(|_| !is_interrupted) {
+    if let Some((_, keeper)) = watch.keeper.as_ref().filter(|_| !is_interrupted) {
         keeper.remove();
     }
 
@@ -314,6 +329,29 @@ fn layers(args: &RenderArgs, outputs: &[Output]) -> Result<Vec<Aov>, Failure> {
         args.layers.iter().any(|name| *name == LayerName::All || *name == LayerName::One(*aov))
     };
     Ok(Aov::ALL.into_iter().filter(is_wanted).collect())
+}
+
+/// The ways in which the picture is shown while it becomes.
+fn views(
+    args: &RenderArgs,
+    outputs: &[Output],
+    size: [u32; 2],
+) -> Result<Vec<(Schedule, View)>, Failure> {
+    let mut views = Vec::new();
+    if let Some(address) = &args.tev {
+        let name = outputs[0].path.display().to_string();
+        let image = TevImage::create(address, &name, size).map_err(|error| {
+            let advice = "accepted: HOST:PORT of a running tev, as in localhost:14158";
+            Failure::BadInput(format!("--tev {address}: {error}; {advice}"))
+        })?;
+        let image = Mutex::new(Some(image));
+        views.push((Schedule::new(TEV_EVERY), View::Tev { image }));
+    }
+    if let Some(path) = &args.preview {
+        let view = View::Preview { path: path.clone(), exposure: args.format.exposure };
+        views.push((Schedule::new(args.preview_every), view));
+    }
+    Ok(views)
 }
 
 fn check_part(part: Part, samples: u32) -> Result<Range<u32>, Failure> {

@@ -2,18 +2,16 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::Failure;
 use super::job::warn;
-use super::progress::{Progress, interrupted};
 use super::units::Part;
 use crate::film::PixelRect;
 use crate::io::{
     Attribute, AttributeValue, StateFile, StateView, WriteError, read_state, write_state,
 };
-use crate::render::{Observer, RenderState, Rendered, Snapshot};
+use crate::render::{RenderState, Rendered, Snapshot};
 use crate::sampler::REPLICATES;
 
 /// How often `--resume` keeps where `--checkpoint` does not say.
@@ -77,31 +75,18 @@ pub(super) fn difference(
 
 /// Keeps checkpoints of a render.
 pub(super) struct Keeper {
-    pub(super) path: PathBuf,
-    every: Duration,
+    path: PathBuf,
     /// What the render is, for the file's header.
     identity: Vec<Attribute>,
-    start: Instant,
-    /// When the next is due, in milliseconds from the start.
-    due: AtomicU64,
 }
 
 impl Keeper {
-    pub(super) fn new(path: PathBuf, every: Duration, identity: Vec<Attribute>) -> Self {
-        let due = AtomicU64::new(every.as_millis() as u64);
-        Self { path, every, identity, start: Instant::now(), due }
+    pub(super) fn new(path: PathBuf, identity: Vec<Attribute>) -> Self {
+        Self { path, identity }
     }
 
-    fn now(&self) -> u64 {
-        self.start.elapsed().as_millis() as u64
-    }
-
-    fn is_due(&self) -> bool {
-        self.now() >= self.due.load(Ordering::Relaxed)
-    }
-
-    fn keep(&self, snapshot: &Snapshot<'_>) {
-        let clock = Instant::now();
+    /// Writes how far it is; that it cannot is no reason to stop.
+    pub(super) fn keep(&self, snapshot: &Snapshot<'_>) {
         let view = StateView {
             film: snapshot.film,
             blocks: snapshot.blocks,
@@ -113,9 +98,6 @@ impl Keeper {
         if let Err(error) = write_state(&self.path, &view, self.identity.clone()) {
             warn(&format!("no checkpoint: {error}"));
         }
-        // Not more than a tenth of the time goes into checkpoints.
-        let pause = self.every.max(10 * clock.elapsed());
-        self.due.store(self.now() + pause.as_millis() as u64, Ordering::Relaxed);
     }
 
     /// Keeps the end of a render that is not finished.
@@ -183,32 +165,6 @@ pub(super) fn write_end(
         non_finite: &rendered.non_finite,
     };
     write_state(path, &view, attributes)
-}
-
-/// Watches a render: shows how it goes, and keeps checkpoints where that is asked for.
-pub(super) struct Watch {
-    pub(super) progress: Progress,
-    pub(super) keeper: Option<Keeper>,
-}
-
-impl Observer for Watch {
-    fn progress(&self, done: f64, rays: u64) {
-        self.progress.report(done, rays);
-    }
-
-    fn stop(&self) -> bool {
-        interrupted()
-    }
-
-    fn wants_look(&self) -> bool {
-        self.keeper.as_ref().is_some_and(Keeper::is_due)
-    }
-
-    fn look(&self, snapshot: &Snapshot<'_>) {
-        if let Some(keeper) = self.keeper.as_ref().filter(|keeper| keeper.is_due()) {
-            keeper.keep(snapshot);
-        }
-    }
 }
 
 /// The command that goes on with this one.

@@ -16,6 +16,7 @@ mod outputs;
 mod progress;
 mod report;
 mod units;
+mod watch;
 
 use std::ffi::OsString;
 use std::io::Write;

@@ -1,7 +1,7 @@
 //! Progress: a bar on a terminal, a line now and then elsewhere, nothing when asked to be quiet.
 
 use std::io::IsTerminal;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -41,6 +41,8 @@ pub(super) struct Progress {
     display: Display,
     phase: &'static str,
     start: Instant,
+    /// The error of the picture so far, as bits; NaN where it is not known.
+    error: AtomicU64,
 }
 
 enum Display {
@@ -65,7 +67,12 @@ impl Progress {
         } else {
             Display::Lines(Mutex::new(Instant::now()))
         };
-        Self { display, phase, start: Instant::now() }
+        Self { display, phase, start: Instant::now(), error: AtomicU64::new(f64::NAN.to_bits()) }
+    }
+
+    /// The error of the picture so far.
+    pub(super) fn report_error(&self, error: f64) {
+        self.error.store(error.to_bits(), Ordering::Relaxed);
     }
 
     /// A share of the phase is done.
@@ -73,9 +80,12 @@ impl Progress {
         let seconds = self.start.elapsed().as_secs_f64();
         let rate = || {
             if rays == 0 {
-                String::new()
-            } else {
-                format!("{:.1} Mrays/s", rays as f64 / seconds / 1e6)
+                return String::new();
+            }
+            let rate = format!("{:.1} Mrays/s", rays as f64 / seconds / 1e6);
+            match f64::from_bits(self.error.load(Ordering::Relaxed)) {
+                error if error.is_nan() => rate,
+                error => format!("{rate}, error {:.2} %", 100.0 * error),
             }
         };
         match &self.display {

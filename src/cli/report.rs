@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::units::{grouped, megabytes};
 use super::{Failure, job::Phases, print};
 use crate::accel::AccelInfo;
-use crate::film::{Aov, Film};
+use crate::film::{Aov, Film, SamplingError};
 use crate::io::{Attribute, AttributeValue, matte_attributes};
 use crate::render::{Rendered, Stop};
 use crate::scene::{Epsilon, IntegratorKind, Scene};
@@ -23,10 +23,21 @@ struct Stats<'a> {
     samples: u32,
     /// Estimated relative sampling error; null at one sample a pixel.
     error: Option<f64>,
+    /// Between which bounds the true one lies in 95 of 100 renders; null likewise.
+    error_interval: Option<[f64; 2]>,
+    /// What it was after how many samples, where a rule asked; the last is that of the picture.
+    error_by_samples: Vec<ErrorAt>,
     /// Why the render ended: "samples", "error", "time" or "interrupted".
     stop: &'static str,
     non_finite_samples: u64,
     accelerator: String,
+}
+
+#[derive(Debug, Serialize)]
+struct ErrorAt {
+    samples: u32,
+    error: f64,
+    interval: [f64; 2],
 }
 
 #[derive(Debug, Serialize)]
@@ -62,6 +73,11 @@ pub(super) fn write_stats(
     accel: &AccelInfo,
 ) -> Result<(), Failure> {
     let ends = rendered.rays.ends;
+    let error = rendered.film.sampling_error();
+    let mut errors = rendered.errors.clone();
+    if let Some(error) = error.filter(|error| errors.last().is_none_or(|(_, e)| e != error)) {
+        errors.push((rendered.samples, error));
+    }
     let stats = Stats {
         seconds: phases,
         rays: Rays {
@@ -80,7 +96,12 @@ pub(super) fn write_stats(
         },
         memory: Memory { peak_bytes: peak_bytes(), accelerator_bytes: accel.bytes },
         samples: rendered.samples,
-        error: rendered.film.relative_error(),
+        error: error.map(|e| e.value),
+        error_interval: error.map(|e| [e.low, e.high]),
+        error_by_samples: errors
+            .into_iter()
+            .map(|(samples, e)| ErrorAt { samples, error: e.value, interval: [e.low, e.high] })
+            .collect(),
         stop: rendered.stop.name(),
         non_finite_samples: rendered.non_finite.count,
         accelerator: accel.to_string(),
@@ -136,10 +157,13 @@ pub(super) fn print_table(phases: &Phases, rendered: &Rendered, accel: &AccelInf
     );
     line(
         "error",
-        match film.relative_error() {
-            Some(error) => {
-                format!("{:.2} % of sampling (relative, root mean square)", 100.0 * error)
-            }
+        match film.sampling_error() {
+            Some(SamplingError { value, low, high }) => format!(
+                "{:.2} % of sampling (relative, root mean square), {:.2} to {:.2} % in 95 of 100",
+                100.0 * value,
+                100.0 * low,
+                100.0 * high
+            ),
             None => "unknown: one sample a pixel gives no estimate".to_owned(),
         },
     );
@@ -206,8 +230,12 @@ pub(super) fn of_layers(scene: &Scene, layers: &[Aov]) -> Vec<Attribute> {
 pub(super) fn outcome(film: &Film, samples: u32, stop: Stop) -> Vec<Attribute> {
     let samples = i32::try_from(samples).unwrap_or(i32::MAX);
     let mut list = vec![Attribute::new("alhazen.samples", AttributeValue::Integer(samples))];
-    if let Some(error) = film.relative_error() {
-        list.push(Attribute::new("alhazen.error", AttributeValue::Float(error)));
+    if let Some(SamplingError { value, low, high }) = film.sampling_error() {
+        for (name, value) in
+            [("alhazen.error", value), ("alhazen.errorLow", low), ("alhazen.errorHigh", high)]
+        {
+            list.push(Attribute::new(name, AttributeValue::Float(value)));
+        }
     }
     if stop != Stop::Samples {
         list.push(Attribute::new("alhazen.stop", AttributeValue::Text(stop.name().to_owned())));

@@ -33,6 +33,7 @@ mod scene_toml;
 mod source;
 mod state;
 mod stl;
+mod tev;
 mod text;
 mod transforms;
 
@@ -53,3 +54,4 @@ pub use picture::{read_picture, read_png};
 pub use png::write_png;
 pub use scene_file::{LoadError, LoadOptions, LoadedScene, load_scene};
 pub use state::{StateFile, StateView, read_state, write_state};
+pub use tev::TevImage;

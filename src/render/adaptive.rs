@@ -84,7 +84,8 @@ pub(super) fn set_targets<'b>(
             candidates.iter().map(share).sum::<f64>() / pixels
         };
         let scale = bisect(|scale| error(scale) <= wanted * wanted);
-        room = room.min(0.5 * added(scale, 1e9));
+        // Nor so few that passes cost more than samples.
+        room = room.min((0.5 * added(scale, 1e9)).max(all / 16.0));
     }
     if let Some((left, per_sample)) = budget.time {
         let fits = pixels * left.as_secs_f64() / (1.1 * per_sample.as_secs_f64()).max(1e-9);

@@ -21,7 +21,7 @@ use self::stop::SoFar;
 pub use self::stop::{Stop, StopRules};
 use self::tiles::{SampledLayers, Tile, TileOutput, TileRenderer, Workspace, tiles};
 use crate::accel::{RayQuery, with_accel};
-use crate::film::{Aov, Film, FilterTable, Layers, PixelRect};
+use crate::film::{Aov, Film, FilterTable, Layers, PixelRect, SamplingError};
 use crate::integrator::{Ao, Everything, Flat, Integrator, Local, RayCounts, Tree, Whitted};
 use crate::scene::{IntegratorKind, Scene, Variant};
 
@@ -59,6 +59,11 @@ pub trait Observer: Sync {
     /// A share of the work is done, from 0 to 1.
     fn progress(&self, done: f64, rays: u64) {
         let _ = (done, rays);
+    }
+
+    /// The error of the picture so far, where a rule asks for it.
+    fn error(&self, error: f64) {
+        let _ = error;
     }
 
     /// Whether to end the render after the blocks that are being worked on.
@@ -111,6 +116,9 @@ pub struct Rendered {
     pub non_finite: NonFinite,
     /// What ended it.
     pub stop: Stop,
+    /// The error by the samples of every pixel (on average) that it was asked after; only where a rule asks
+    /// for it.
+    pub errors: Vec<(u32, SamplingError)>,
     /// What to go on from, where it was to be kept.
     pub state: Option<RenderState>,
 }
@@ -214,6 +222,7 @@ fn run<Q: RayQuery, I: Integrator>(
         first_sample: job.first_sample,
         passed: job.first_sample,
         is_adaptive: job.is_adaptive && rules.look_at_the_film(),
+        errors: Vec::new(),
     };
     if is_kept {
         let state =
@@ -242,6 +251,8 @@ struct Run<'a, Q, I> {
     /// Number of the sample at which the last finished pass ended.
     passed: u32,
     is_adaptive: bool,
+    /// What the error was at which number of samples.
+    errors: Vec<(u32, SamplingError)>,
 }
 
 impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
@@ -282,9 +293,9 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
             let most = self.blocks().map(|block| block.sums.samples().end).max().unwrap_or(0);
             target = target.min(rules.samples.max(most));
             if target <= self.passed {
-                so_far.error = rules.error.and_then(|_| {
-                    self.film.get_mut().unwrap_or_else(PoisonError::into_inner).relative_error()
-                });
+                if self.passed > self.first_sample && rules.error.is_some() {
+                    so_far.error = self.look_at_error();
+                }
                 if self.passed > self.first_sample
                     && let Some(stop) = rules.end(&so_far)
                 {
@@ -322,13 +333,13 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
         let area = self.renderer.window.area() as f64;
         loop {
             if !self.blocks().any(|block| block.is_behind(u32::MAX)) {
-                let film = self.film.get_mut().unwrap_or_else(PoisonError::into_inner);
-                so_far.error = film.relative_error();
+                so_far.error = self.look_at_error();
                 if let Some((wanted, error)) = rules.error.zip(so_far.error)
                     && error <= wanted
                 {
                     return Stop::Error;
                 }
+                let film = self.film.get_mut().unwrap_or_else(PoisonError::into_inner);
                 let Some(shares) = film.block_shares() else { return Stop::Samples };
                 let left = rules.deadline.map(|at| at.saturating_duration_since(Instant::now()));
                 let budget = Budget {
@@ -363,6 +374,16 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
             let least = self.blocks().map(|block| block.sums.samples().end).min();
             self.passed = least.unwrap_or(self.passed);
         }
+    }
+
+    /// The error of the picture so far, which is noted.
+    fn look_at_error(&mut self) -> Option<f64> {
+        let film = self.film.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let error = film.sampling_error()?;
+        let samples = *self.samples_done.get_mut() as f64 / film.window.area() as f64;
+        self.errors.push((samples.round() as u32, error));
+        self.observer.error(error.value);
+        Some(error.value)
     }
 
     /// Renders a pass: every block up to its target, or to sample number `limit`; stands still for a look
@@ -465,6 +486,6 @@ impl<Q: RayQuery, I: Integrator> Run<'_, Q, I> {
             layers: film.layers.wanted.clone(),
             mattes: film.layers.mattes.clone(),
         });
-        Rendered { film, samples, rays, non_finite, stop, state }
+        Rendered { film, samples, rays, non_finite, stop, errors: self.errors, state }
     }
 }
