@@ -265,7 +265,7 @@ fn bad_input_is_exit_code_2_and_nothing_is_written() {
         ),
         (
             &["render", "scene.toml", "-o", "x.jpg"],
-            "x.jpg: unknown kind of picture; accepted: .exr, .png",
+            "x.jpg: unknown kind of picture; accepted: .exr, .hdr, .png",
         ),
         (
             &["render", "scene.toml", "-o", "nowhere/x.exr"],

@@ -150,3 +150,65 @@ fn the_values_are_ours() {
     );
     assert!(difference.contains("PASS"), "{difference}");
 }
+
+/// Every kind of file is read by others as it was meant, and unchanged where nothing is lost.
+#[test]
+fn every_layout_compression_and_type_is_read() {
+    let folder = folder_with_pictures();
+    let render = |name: &str, arguments: &str| {
+        let all = "render scene.toml --quiet --seed 42 --layers depth,crypto_object -o";
+        let all: Vec<&str> = all.split(' ').chain([name]).chain(arguments.split(' ')).collect();
+        let output = alhazen(folder.path(), &all);
+        assert!(output.status.success(), "{arguments}: {}", stderr(&output));
+    };
+    for kind in ["half", "float"] {
+        render("plain.exr", &format!("--exr-type {kind} --exr-compression none"));
+        for layout in ["scanline", "tiles"] {
+            for compression in ["none", "rle", "zips", "zip", "piz", "b44", "b44a"] {
+                let arguments = format!(
+                    "--exr-type {kind} --exr-compression {compression} --exr-layout {layout}"
+                );
+                render("this.exr", &arguments);
+                let header = tool("exrheader", &["this.exr"], folder.path());
+                let bits = if kind == "half" { "16-bit" } else { "32-bit" };
+                let tiles = if layout == "tiles" {
+                    "tile size 64 by 64 pixels"
+                } else {
+                    "lineOrder (type lineOrder): increasing y"
+                };
+                expect(
+                    &header,
+                    &[
+                        &format!("R, {bits} floating-point"),
+                        "Z, 32-bit floating-point",
+                        "CryptoObject00.R, 32-bit floating-point",
+                        &format!("compression (type compression): {compression}"),
+                        "displayWindow (type box2i): (0 0) - (95 63)",
+                        "alhazen.seed (type string): \"42\"",
+                        tiles,
+                    ],
+                );
+                // Both round halves, and nothing else.
+                let is_lossy = compression.starts_with("b44") && kind == "half";
+                let limit = if is_lossy { "0.02" } else { "0" };
+                tool(
+                    "idiff",
+                    &["-fail", limit, "-warn", limit, "this.exr", "plain.exr"],
+                    folder.path(),
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn hdr_files_are_read_with_three_digits() {
+    let folder = folder_with_pictures();
+    let arguments = "render scene.toml --quiet --seed 42 -o out.hdr -o same.exr --exr-type float";
+    let output = alhazen(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let info = tool("oiiotool", &["--info", "-v", "out.hdr"], folder.path());
+    expect(&info, &["96 x   64, 3 channel"]);
+    // A step is 1/256 of the brightest channel at least, and the picture ends at about 1.5.
+    tool("idiff", &["-fail", "0.012", "-warn", "0.012", "out.hdr", "same.exr"], folder.path());
+}

@@ -201,7 +201,8 @@ fn small_exr(compression: ExrCompression, pixel_type: PixelType) -> Vec<u8> {
     for (i, pixel) in film.mean.iter_mut().enumerate() {
         *pixel = Rgb::new(i as f32 / 3.0, (i as f32).sin(), 0.5);
     }
-    write_exr(&path, &film, &[], &ExrOptions { pixel_type, compression }).unwrap();
+    write_exr(&path, &film, &[], &ExrOptions { pixel_type, compression, ..ExrOptions::default() })
+        .unwrap();
     std::fs::read(&path).unwrap()
 }
 

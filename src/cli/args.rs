@@ -12,7 +12,7 @@ use super::units::{
 use crate::accel::{AccelKind, BuildQuality, Precision};
 use crate::film::{Aov, Filter, PixelRect};
 use crate::geometry::generate::GeneratedKind;
-use crate::io::{ExrCompression, NonFinite, PixelType};
+use crate::io::{ExrCompression, ExrLayout, NonFinite, PixelType, ToneMap};
 use crate::measure::bench::StructureKind;
 use crate::scene::IntegratorKind;
 
@@ -44,7 +44,7 @@ pub(super) struct Args {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Render a scene (.toml) or a bare mesh (.ply, .obj, .stl) to EXR or PNG
+    /// Render a scene (.toml) or a bare mesh (.ply, .obj, .stl) to EXR, HDR or PNG
     Render(RenderArgs),
     /// Join the parts of a picture that were rendered with --part, to the same picture as in one piece
     Merge(MergeArgs),
@@ -145,7 +145,7 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub(super) accel: AccelArgs,
 
-    /// File to write, .exr or .png; repeatable. Without it: the scene's name with .exr, in this folder
+    /// File to write, .exr, .hdr or .png; repeatable. Without it: the scene's name with .exr, in this folder
     #[arg(long, short, value_name = "FILE")]
     pub(super) output: Vec<PathBuf>,
 
@@ -216,7 +216,7 @@ pub(super) struct MergeArgs {
     #[arg(required = true, value_name = "PART.exr")]
     pub(super) parts: Vec<PathBuf>,
 
-    /// File to write, .exr or .png; repeatable
+    /// File to write, .exr, .hdr or .png; repeatable
     #[arg(long, short, value_name = "FILE", required = true)]
     pub(super) output: Vec<PathBuf>,
 
@@ -239,6 +239,11 @@ pub(super) struct FormatArgs {
     #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(super) exposure: f32,
 
+    /// Tone curve of PNG files: `srgb` clips what is brighter than 1, `filmic` has a toe and a shoulder
+    #[arg(long, value_name = "NAME", default_value = ToneMap::ALL[0].name(),
+          value_parser = by_name(&ToneMap::ALL, ToneMap::name))]
+    pub(super) tonemap: ToneMap,
+
     /// Channel type of EXR files; a picture that half cannot hold is written as float
     #[arg(long, value_name = "TYPE", default_value = PixelType::ALL[0].name(),
           value_parser = by_name(&PixelType::ALL, PixelType::name))]
@@ -248,6 +253,11 @@ pub(super) struct FormatArgs {
     #[arg(long, value_name = "NAME", default_value = "zip",
           value_parser = by_name(&ExrCompression::ALL, ExrCompression::name))]
     pub(super) exr_compression: ExrCompression,
+
+    /// How EXR files group pixels: rows, or tiles of 64 x 64
+    #[arg(long, value_name = "NAME", default_value = ExrLayout::ALL[0].name(),
+          value_parser = by_name(&ExrLayout::ALL, ExrLayout::name))]
+    pub(super) exr_layout: ExrLayout,
 }
 
 #[derive(Debug, clap::Args)]

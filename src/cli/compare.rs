@@ -9,7 +9,7 @@ use super::units::grouped;
 use super::{Failure, Outcome, print};
 use crate::film::{Film, Layers, Picture, PixelRect};
 use crate::io::{
-    ExrOptions, PixelType, WriteError, check_writable, read_picture, write_exr, write_png,
+    ExrOptions, PixelType, ToneMap, WriteError, check_writable, read_picture, write_exr, write_png,
     write_text,
 };
 use crate::measure::{
@@ -75,7 +75,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
         }
         Some(Difference::Png(path)) => {
             let pixels = found.flip_map.iter().map(|&x| magma(x)).collect();
-            write_png(path, &film(Picture { pixels, ..b }), 0.0).map_err(failed)?;
+            write_png(path, &film(Picture { pixels, ..b }), 0.0, ToneMap::Srgb).map_err(failed)?;
         }
         None => {}
     }

@@ -348,7 +348,8 @@ fn views(
         views.push((Schedule::new(TEV_EVERY), View::Tev { image }));
     }
     if let Some(path) = &args.preview {
-        let view = View::Preview { path: path.clone(), exposure: args.format.exposure };
+        let (exposure, tone_map) = (args.format.exposure, args.format.tonemap);
+        let view = View::Preview { path: path.clone(), exposure, tone_map };
         views.push((Schedule::new(args.preview_every), view));
     }
     Ok(views)

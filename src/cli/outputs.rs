@@ -7,7 +7,7 @@ use super::job::warn;
 use super::{Failure, print};
 use crate::film::Film;
 use crate::io::{
-    Attribute, ExrOptions, PixelType, WriteError, check_writable, write_exr, write_png,
+    Attribute, ExrOptions, PixelType, WriteError, check_writable, write_exr, write_hdr, write_png,
 };
 
 /// A file to write.
@@ -20,6 +20,7 @@ pub(super) struct Output {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Exr,
+    Hdr,
     Png,
 }
 
@@ -29,10 +30,13 @@ impl Output {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         let format = match extension.as_str() {
             "exr" => Format::Exr,
+            "hdr" => Format::Hdr,
             "png" => Format::Png,
             _ => {
-                let message =
-                    format!("{}: unknown kind of picture; accepted: .exr, .png", path.display());
+                let message = format!(
+                    "{}: unknown kind of picture; accepted: .exr, .hdr, .png",
+                    path.display()
+                );
                 return Err(Failure::BadInput(message));
             }
         };
@@ -54,8 +58,11 @@ impl Output {
     ) -> Result<(), WriteError> {
         match self.format {
             Format::Exr => {
-                let options =
-                    ExrOptions { pixel_type: how.exr_type, compression: how.exr_compression };
+                let options = ExrOptions {
+                    pixel_type: how.exr_type,
+                    compression: how.exr_compression,
+                    layout: how.exr_layout,
+                };
                 let used = write_exr(path, film, attributes, &options)?;
                 if used != how.exr_type && !quiet {
                     warn(&format!(
@@ -66,7 +73,18 @@ impl Output {
                 }
                 Ok(())
             }
-            Format::Png => write_png(path, film, how.exposure),
+            Format::Hdr => {
+                let clipped = write_hdr(path, film)?;
+                if clipped > 0 && !quiet {
+                    warn(&format!(
+                        "{}: {clipped} pixels have values that HDR does not hold: negative ones are \
+                         0 there",
+                        path.display()
+                    ));
+                }
+                Ok(())
+            }
+            Format::Png => write_png(path, film, how.exposure, how.tonemap),
         }
     }
 }

@@ -9,7 +9,7 @@ use super::job::warn;
 use super::keep::Keeper;
 use super::progress::{Progress, interrupted};
 use crate::film::Film;
-use crate::io::{TevImage, write_png};
+use crate::io::{TevImage, ToneMap, write_png};
 use crate::render::{Observer, Snapshot};
 
 /// How often tev is shown the picture.
@@ -56,6 +56,7 @@ pub(super) enum View {
     Preview {
         path: PathBuf,
         exposure: f32,
+        tone_map: ToneMap,
     },
 }
 
@@ -72,8 +73,8 @@ impl View {
                     *image = None;
                 }
             }
-            Self::Preview { path, exposure } => {
-                if let Err(error) = write_png(path, film, *exposure) {
+            Self::Preview { path, exposure, tone_map } => {
+                if let Err(error) = write_png(path, film, *exposure, *tone_map) {
                     warn(&format!("no preview: {error}"));
                 }
             }

@@ -8,7 +8,10 @@ use std::path::Path;
 use exr::block::writer::ChunksWriter;
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::compression::ByteVec;
-use exr::meta::attribute::{AttributeValue as ExrValue, Chromaticities, IntegerBounds, Text};
+use exr::math::RoundingMode;
+use exr::meta::attribute::{
+    AttributeValue as ExrValue, Chromaticities, IntegerBounds, LevelMode, Text, TileDescription,
+};
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::{ChannelDescription, Compression, LineOrder, SampleType, Vec2, f16};
@@ -99,6 +102,40 @@ impl ExrCompression {
     }
 }
 
+/// How pixels are grouped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ExrLayout {
+    /// Rows, as many at once as the compression takes.
+    #[default]
+    Scanline,
+    /// Tiles of 64 × 64 pixels: a reader that wants a part of a large picture reads no more.
+    Tiles,
+}
+
+impl ExrLayout {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Scanline, Self::Tiles];
+
+    /// The name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scanline => "scanline",
+            Self::Tiles => "tiles",
+        }
+    }
+
+    const fn native(self) -> BlockDescription {
+        match self {
+            Self::Scanline => BlockDescription::ScanLines,
+            Self::Tiles => BlockDescription::Tiles(TileDescription {
+                tile_size: Vec2(64, 64),
+                level_mode: LevelMode::Singular,
+                rounding_mode: RoundingMode::Down,
+            }),
+        }
+    }
+}
+
 /// How to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ExrOptions {
@@ -106,6 +143,8 @@ pub struct ExrOptions {
     pub pixel_type: PixelType,
     /// Compression of the whole file.
     pub compression: ExrCompression,
+    /// How pixels are grouped.
+    pub layout: ExrLayout,
 }
 
 /// A channel of a file.
@@ -302,11 +341,7 @@ fn header(
         ChannelDescription::new(channel.name.as_str(), channel.sample_type(pixel_type), false)
     });
     Header::new(Text::from(""), (window.width() as usize, window.height() as usize), list.collect())
-        .with_encoding(
-            options.compression.native(),
-            BlockDescription::ScanLines,
-            LineOrder::Increasing,
-        )
+        .with_encoding(options.compression.native(), options.layout.native(), LineOrder::Increasing)
         .with_shared_attributes(shared)
         .with_attributes(own)
 }

@@ -28,6 +28,7 @@ mod picture;
 mod ply;
 mod png;
 mod polygon;
+mod radiance;
 mod scene_file;
 mod scene_toml;
 mod source;
@@ -39,7 +40,8 @@ mod transforms;
 
 pub use error::{ReadError, WriteError};
 pub use exr::{
-    Channel, ChannelValues, ExrCompression, ExrOptions, PixelType, Row, write_channels, write_exr,
+    Channel, ChannelValues, ExrCompression, ExrLayout, ExrOptions, PixelType, Row, write_channels,
+    write_exr,
 };
 pub use exr_read::read_exr;
 pub use grid::{SampleLayout, SampleType, read_npy, read_raw};
@@ -51,7 +53,8 @@ pub use mesh_write::write_mesh;
 pub use mistakes::{Mistake, Mistakes};
 pub use output::{Attribute, AttributeValue, check_writable, remove_unfinished, write_text};
 pub use picture::{read_picture, read_png};
-pub use png::write_png;
+pub use png::{ToneMap, write_png};
+pub use radiance::write_hdr;
 pub use scene_file::{LoadError, LoadOptions, LoadedScene, load_scene};
 pub use state::{StateFile, StateView, read_state, write_state};
 pub use tev::TevImage;

@@ -90,5 +90,11 @@ pub fn keep(name: &str, ours: &Picture, theirs: &Picture) {
     let size = [3 * ours.extent[0], ours.extent[1]];
     let mut film = Film::new(size, PixelRect::whole(size), false);
     film.mean = side_by_side.collect();
-    write_png(&Path::new(&folder).join(format!("{name}.png")), &film, 0.0).unwrap();
+    write_png(
+        &Path::new(&folder).join(format!("{name}.png")),
+        &film,
+        0.0,
+        alhazen::io::ToneMap::Srgb,
+    )
+    .unwrap();
 }
