@@ -12,6 +12,9 @@ use alhazen::scene::Scene;
 mod common;
 use common::{Random, alhazen, stderr, verify};
 
+/// Makes a scene, with what files it takes in a folder.
+type Make = fn(&Path) -> Scene;
+
 fn size() -> [u32; 2] {
     if verify() { [128, 96] } else { [64, 48] }
 }
@@ -115,7 +118,7 @@ fn large_mesh(folder: &Path) -> Scene {
 #[test]
 fn the_true_error_lies_in_the_stated_interval() {
     let folder = tempfile::tempdir().unwrap();
-    let scenes: [(&str, fn(&Path) -> Scene); 4] = [
+    let scenes: [(&str, Make); 4] = [
         ("showcase", showcase),
         ("mirrors and glass", spheres),
         ("soft shadows", soft_shadows),
@@ -170,7 +173,7 @@ fn the_true_error_lies_in_the_stated_interval() {
 #[test]
 fn adaptive_sampling_is_cheaper_and_nearly_unbiased() {
     let folder = tempfile::tempdir().unwrap();
-    let scenes: [(&str, fn(&Path) -> Scene); 3] =
+    let scenes: [(&str, Make); 3] =
         [("showcase", showcase), ("mirrors and glass", spheres), ("soft shadows", soft_shadows)];
     let (seeds, many) = if verify() { (50, 1 << 15) } else { (4, 1 << 11) };
     for (name, make) in scenes {

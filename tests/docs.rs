@@ -30,7 +30,8 @@ const REFERENCE: [(&str, &str); 6] = [
 ];
 
 /// Pages with scenes and links beside the reference.
-const OTHERS: [(&str, &str); 3] = [
+const OTHERS: [(&str, &str); 4] = [
+    ("docs/output.md", include_str!("../docs/output.md")),
     ("docs/bench.md", include_str!("../docs/bench.md")),
     ("README.md", include_str!("../README.md")),
     ("docs/lecture.md", include_str!("../docs/lecture.md")),

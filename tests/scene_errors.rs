@@ -57,7 +57,7 @@ f.toml:8:11: `samples` must be a whole number from 1 to 16777216, not the number
 f.toml:9:10: unknown filter `boxx` (did you mean `box`?); accepted: box, triangle, gaussian, mitchell, blackman-harris
 f.toml:10:11: `epsilon` must be &quot;auto&quot; or a distance from 0 on, not the text &quot;small&quot;
 f.toml:11:1: a sphere lacks the field `radius`
-f.toml:13:1: unknown field `raduis` in a sphere (did you mean `radius`?); accepted: shape, center, radius, material, transform, texture_transform
+f.toml:13:1: unknown field `raduis` in a sphere (did you mean `radius`?); accepted: shape, center, radius, material, name, transform, texture_transform
 f.toml:15:9: unknown shape `spere` (did you mean `sphere`?); accepted: sphere, box, cylinder, cone, torus, disk, plane, quadric, implicit, isosurface, polygon, triangle, mesh, patches, nurbs, subdivision
 f.toml:17:1: [[lights]] lacks the field `intensity`
 "

@@ -47,7 +47,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         return Err(Failure::BadInput(message.to_owned()));
     }
     let layers = layers(args, &outputs)?;
-    if !args.preview.as_ref().is_none_or(|path| path.extension().is_some_and(|e| e == "png")) {
+    if args.preview.as_ref().is_some_and(|path| path.extension().is_none_or(|e| e != "png")) {
         return Err(Failure::BadInput("--preview must end in .png".to_owned()));
     }
     let checkpoint =

@@ -174,7 +174,7 @@ pub fn write_state(
     let replicates = (0..REPLICATES).flat_map(|r| (0..grid.slots(r)).map(move |slot| (r, slot)));
     let nodes = layer_names(&layers.wanted).into_iter().enumerate();
     for ((layer, of), (r, slot)) in
-        nodes.flat_map(|layer| replicates.clone().map(move |node| (layer.clone(), node)))
+        nodes.flat_map(|layer| replicates.clone().map(move |node| (layer, node)))
     {
         let (count, sums) = names(of, r, slot);
         let of_count = move |placed: &Placed<'_>, lane: usize| {

@@ -141,7 +141,7 @@ impl SampledLayers {
     pub(super) fn new(scene: &Scene, wanted: &[Aov]) -> Self {
         let (means, mattes) = (Layers::means_of(wanted), Layers::mattes_of(wanted));
         let ids = |aov, names: &[String]| {
-            let wanted = mattes.contains(&aov).then_some(names).unwrap_or_default();
+            let wanted: &[String] = if mattes.contains(&aov) { names } else { &[] };
             wanted.iter().map(|name| cryptomatte_id(name)).collect()
         };
         Self {
