@@ -3,8 +3,9 @@
 # newer. Idempotent, and quick when nothing is missing.
 #
 #   scripts/setup.sh build   C compiler, libclang (for bindgen), Embree 4
-#   scripts/setup.sh test    the same, the EXR tools that the tests read our files with, and POV-Ray,
-#                            with whose pictures they compare ours
+#   scripts/setup.sh test    the same, the EXR tools that the tests read our files with (Python's OpenEXR
+#                            package among them, in .python), and POV-Ray, with whose pictures they
+#                            compare ours
 #   scripts/setup.sh fuzz    C++ compiler, for libFuzzer (the fuzz targets need neither libclang nor Embree)
 #
 # Embree comes from, in this order: EMBREE_DIR, the project's own prefix (.embree), the system.
@@ -133,4 +134,21 @@ if [ "$stage" = test ]; then
     command -v povray >/dev/null 2>&1 || missing="$missing povray"
     # shellcheck disable=SC2086  # a list of package names
     install_packages $missing
+
+    # Debian packages no Python bindings of OpenEXR; the Python Package Index does.
+    python=$root/.python
+    wanted=openexr-3.5.3
+    if ! [ -f "$python/$wanted" ]; then
+        /usr/bin/python3 -c 'import ensurepip, venv' 2>/dev/null || install_packages python3-venv
+        say "installing Python's OpenEXR in .python"
+        rm -rf "$python"
+        if /usr/bin/python3 -m venv "$python" &&
+            "$python/bin/pip" install -q --disable-pip-version-check --only-binary :all: \
+                "OpenEXR==${wanted#openexr-}" numpy; then
+            touch "$python/$wanted"
+        else
+            rm -rf "$python"
+            say "could not; the tests of what it reads say that they did not run"
+        fi
+    fi
 fi

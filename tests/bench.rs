@@ -192,6 +192,6 @@ fn wrong_names_and_targets_are_refused_before_any_work() {
     let same = ["bench", "scene.toml", "--json", "x", "--html", "x"];
     assert!(refused(folder.path(), &same).contains("written twice"));
     let over = ["bench", "scene.toml", "--json", "scene.toml"];
-    assert!(refused(folder.path(), &over).contains("over the scene"));
+    assert!(refused(folder.path(), &over).contains("over an input"));
     assert!(refused(folder.path(), &["bench", "missing.ply"]).contains("missing.ply"));
 }

@@ -1,9 +1,11 @@
-//! Our EXR files as other programs read them: OpenEXR's `exrheader` and OpenImageIO's `oiiotool`,
-//! which `make test` installs.
+//! Our EXR files as other programs read them: OpenEXR's `exrheader`, OpenImageIO's `oiiotool` and
+//! `idiff`, and Python's package `OpenEXR`, which `make test` installs.
 #![allow(missing_docs, reason = "a test program")]
 
 use std::path::Path;
 use std::process::Command;
+
+use serde_json::{Value, json};
 
 mod common;
 use common::{alhazen, stderr};
@@ -21,6 +23,22 @@ fn expect(text: &str, lines: &[&str]) {
     for line in lines {
         assert!(text.contains(line), "`{line}` is not in:\n{text}");
     }
+}
+
+/// The files as Python's package `OpenEXR` reads them (`tests/read_exr.py`), in their order; nothing,
+/// and a line that says so, where set-up could not install it.
+fn python(files: &[String], folder: &Path) -> Option<Vec<Value>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let python = root.join(".python/bin/python");
+    if !python.exists() {
+        eprintln!("not run: Python's package OpenEXR is not installed");
+        return None;
+    }
+    let script = root.join("tests/read_exr.py");
+    let mut arguments = vec![script.to_str().unwrap()];
+    arguments.extend(files.iter().map(String::as_str));
+    let lines = tool(python.to_str().unwrap(), &arguments, folder);
+    Some(lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
 }
 
 fn folder_with_pictures() -> tempfile::TempDir {
@@ -219,4 +237,113 @@ fn hdr_files_are_read_with_three_digits() {
     expect(&info, &["96 x   64, 3 channel"]);
     // A step is 1/256 of the brightest channel at least, and the picture ends at about 1.5.
     tool("idiff", &["-fail", "0.012", "-warn", "0.012", "out.hdr", "same.exr"], folder.path());
+}
+
+/// Python's `OpenEXR` reads every kind of file: the types, windows and attributes that were meant, and
+/// of lossless ones the same values.
+#[test]
+fn python_reads_every_kind() {
+    let folder = folder_with_pictures();
+    let mut files = Vec::new();
+    let mut meant = Vec::new();
+    for kind in ["half", "float"] {
+        for layout in ["scanline", "tiles"] {
+            for compression in ["none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a"] {
+                let name = format!("{kind}-{layout}-{compression}.exr");
+                let mut arguments = vec!["render", "scene.toml", "--quiet", "--seed", "42"];
+                arguments.extend(["--crop", "10,20,61,60", "-o", &name, "--exr-type", kind]);
+                arguments.extend(["--exr-layout", layout, "--exr-compression", compression]);
+                if compression != "pxr24" {
+                    arguments.extend(["--layers", "all"]);
+                }
+                let output = alhazen(folder.path(), &arguments);
+                assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+                files.push(name);
+                meant.push((kind, layout, compression));
+            }
+        }
+    }
+    let Some(read) = python(&files, folder.path()) else { return };
+    assert_eq!(read.len(), files.len());
+    for ((file, (kind, layout, compression)), name) in read.iter().zip(meant).zip(&files) {
+        let header = &file["header"];
+        let storage = if layout == "tiles" { "tiledimage" } else { "scanlineimage" };
+        assert_eq!(header["type"], format!("Storage.{storage}"), "{name}");
+        let called = if compression == "none" { "no" } else { compression }.to_uppercase();
+        let called = format!("Compression.{called}_COMPRESSION");
+        assert_eq!(header["compression"], called, "{name}");
+        assert_eq!(header["dataWindow"], json!([[10, 20], [60, 59]]), "{name}");
+        assert_eq!(header["displayWindow"], json!([[0, 0], [95, 63]]), "{name}");
+        assert_eq!(header["alhazen.seed"], "42", "{name}");
+        assert_eq!(header["alhazen.samples"], 8, "{name}");
+        assert_eq!(header["alhazen.origin"], json!([0.0, 0.0, 0.0]), "{name}");
+        let white: Vec<f64> = serde_json::from_value(header["chromaticities"].clone()).unwrap();
+        assert!((white[6] - 0.3127).abs() < 1e-6 && (white[7] - 0.329).abs() < 1e-6, "{name}");
+        if compression != "pxr24" {
+            let attributes = header.as_object().unwrap();
+            let mut mattes: Vec<_> = attributes
+                .iter()
+                .filter(|(key, _)| key.starts_with("cryptomatte/") && key.ends_with("/name"))
+                .map(|(_, value)| value.as_str().unwrap())
+                .collect();
+            mattes.sort_unstable();
+            assert_eq!(mattes, ["CryptoMaterial", "CryptoObject"], "{name}");
+        }
+
+        // The reference: the same type without compression, in scanlines.
+        let plain = files.iter().position(|f| *f == format!("{kind}-scanline-none.exr")).unwrap();
+        let plain = &read[plain]["channels"];
+        let channels = file["channels"].as_object().unwrap();
+        let colours = if kind == "half" { "PixelType.HALF" } else { "PixelType.FLOAT" };
+        assert_eq!(channels["R"]["type"], colours, "{name}");
+        if compression != "pxr24" {
+            assert_eq!(channels.len(), plain.as_object().unwrap().len(), "{name}");
+            assert_eq!(channels["Z"]["type"], "PixelType.FLOAT", "{name}");
+        }
+        for (channel, is) in channels {
+            assert_eq!(is["size"], json!([51, 40]), "{name}: {channel}");
+            assert_eq!(is["type"], plain[channel]["type"], "{name}: {channel}");
+            let rounds_halves = compression.starts_with("b44");
+            let is_half = is["type"] == "PixelType.HALF";
+            if if is_half { rounds_halves } else { compression == "pxr24" } {
+                let mean = |v: &Value| v["mean"].as_f64().unwrap();
+                let (is, was) = (mean(is), mean(&plain[channel]));
+                let limit = if is_half { 0.02 } else { 1e-4 };
+                assert!((is - was).abs() <= limit * was.abs().max(1.0), "{name}: {channel}: {is}");
+            } else {
+                assert_eq!(is["checksum"], plain[channel]["checksum"], "{name}: {channel}");
+            }
+        }
+    }
+    // The corner that the crop begins with is the background, as the scene has it.
+    for (channel, value) in [("R", 0.25), ("G", 0.5), ("B", 1.0)] {
+        assert_eq!(read[0]["channels"][channel]["first"], value);
+    }
+}
+
+/// What a part and a checkpoint hold is read by Python's `OpenEXR` like any other file: whole numbers
+/// beside the picture, which a merged file no longer has.
+#[test]
+fn python_reads_parts_and_what_they_merge_to() {
+    let folder = folder_with_pictures();
+    let run = |line: &str| {
+        let output = alhazen(folder.path(), &line.split(' ').collect::<Vec<_>>());
+        assert!(output.status.success(), "{line}: {}", stderr(&output));
+    };
+    run("render scene.toml --quiet --seed 42 --layers depth -o whole.exr");
+    run("render scene.toml --quiet --seed 42 --layers depth --part 1/2 -o 1.exr");
+    run("render scene.toml --quiet --seed 42 --layers depth --part 2/2 -o 2.exr");
+    run("merge 1.exr 2.exr -o merged.exr --quiet");
+    let files = ["whole.exr", "1.exr", "merged.exr"].map(str::to_owned);
+    let Some(read) = python(&files, folder.path()) else { return };
+    let [whole, part, merged] = &read[..] else { panic!("three files") };
+    assert_eq!(whole, merged);
+    assert_eq!(part["header"]["alhazen.part"], "1/2");
+    let channels = part["channels"].as_object().unwrap();
+    let states: Vec<_> = channels.iter().filter(|(name, _)| name.starts_with("state.")).collect();
+    assert!(states.len() > 10);
+    for (name, state) in states {
+        assert_eq!(state["type"], "PixelType.UINT", "{name}");
+    }
+    assert!(merged["channels"].as_object().unwrap().keys().all(|name| !name.contains("state")));
 }

@@ -2,7 +2,7 @@
 #![allow(missing_docs, reason = "a test program")]
 
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 mod common;
@@ -288,4 +288,108 @@ fn a_folder_that_vanishes_does_not_take_the_picture_along() {
     assert!(message.contains("the picture was written to"), "{message}");
     let rescued = std::fs::read_dir(folder.join("tmp")).unwrap().next().unwrap().unwrap().path();
     assert!(std::fs::read(rescued).unwrap() == std::fs::read(folder.join("whole.exr")).unwrap());
+}
+
+/// Runs a script of the shell in `folder`, where `disk` is a file system of its own of `kilobytes`, and
+/// rescued pictures go to `tmp`; nothing, and a line that says so, where the system does not let us mount.
+fn on_a_small_disk(folder: &Path, kilobytes: u32, script: &str) -> Option<Output> {
+    let run = |script: &str| {
+        Command::new("unshare")
+            .args(["--map-root-user", "--mount", "sh", "-c", script])
+            .current_dir(folder)
+            .env("ALHAZEN", env!("CARGO_BIN_EXE_alhazen"))
+            .env("TMPDIR", folder.join("tmp"))
+            .output()
+    };
+    for name in ["disk", "tmp"] {
+        std::fs::create_dir_all(folder.join(name)).unwrap();
+    }
+    let mount = format!("mount -t tmpfs -o size={kilobytes}k none disk");
+    if !run(&mount).is_ok_and(|output| output.status.success()) {
+        eprintln!("not run: no file systems may be mounted here");
+        return None;
+    }
+    Some(run(&format!("{mount} && {script}")).unwrap())
+}
+
+/// The only file in `folder`.
+fn only_file(folder: &Path) -> Vec<u8> {
+    let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
+    let [file] = files.as_slice() else { panic!("{files:?}") };
+    std::fs::read(file).unwrap()
+}
+
+#[test]
+fn a_full_disk_leaves_the_old_file_and_takes_no_work() {
+    let folder = folder();
+    let folder = folder.path();
+    render(folder, "-q -o whole.exr --exr-compression none");
+    render(folder, "-q -o part.exr --part 1/2");
+    std::fs::write(folder.join("old.exr"), "the old picture").unwrap();
+    for (arguments, whole) in [
+        ("--exr-compression none", "whole.exr"),
+        ("-o disk/out.png --exr-compression none", "whole.exr"),
+        ("--part 1/2", "part.exr"),
+    ] {
+        let script = format!(
+            "cp old.exr disk/out.exr; $ALHAZEN render scene.toml -q -o disk/out.exr {arguments}; \
+             code=$?; cat disk/out.exr; ls disk | tr '\n' ' '; exit $code"
+        );
+        let Some(output) = on_a_small_disk(folder, 52, &script) else { return };
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{arguments}: {message}");
+        assert!(message.contains("disk/out.exr: cannot write: No space left"), "{message}");
+        assert!(message.contains("the picture was written to"), "{message}");
+        // The smaller picture beside it was written; of the other nothing is left.
+        let files = if arguments.contains("png") { "out.exr out.png " } else { "out.exr " };
+        assert_eq!(stdout(&output), format!("the old picture{files}"));
+        let rescued = only_file(&folder.join("tmp"));
+        assert!(rescued == std::fs::read(folder.join(whole)).unwrap(), "{arguments}");
+        std::fs::remove_dir_all(folder.join("tmp")).unwrap();
+    }
+}
+
+#[test]
+fn a_disk_too_full_for_checkpoints_does_not_end_the_render() {
+    let folder = folder();
+    let folder = folder.path();
+    render(folder, "-q -o whole.exr --samples 600");
+    let script = "$ALHAZEN render scene.toml -q -o disk/out.exr --samples 600 --checkpoint 0.05s; \
+                  code=$?; cp disk/out.exr .; ls disk | tr '\n' ' '; exit $code";
+    let Some(output) = on_a_small_disk(folder, 120, script) else { return };
+    assert!(output.status.success(), "{}", stderr(&output));
+    let message = stderr(&output);
+    assert!(message.contains("no checkpoint: disk/out.checkpoint.exr: cannot write"), "{message}");
+    assert_eq!(stdout(&output), "out.exr ");
+    same(folder, "whole.exr", "out.exr");
+}
+
+#[test]
+fn a_read_only_folder_is_told_at_once_and_takes_no_work_later() {
+    let folder = folder();
+    let folder = folder.path();
+    render(folder, "-q -o whole.exr --samples 900");
+    std::fs::write(folder.join("old.exr"), "the old picture").unwrap();
+    // Before the render.
+    let script = "cp old.exr disk/out.exr; mount -o remount,ro disk; \
+                  $ALHAZEN render scene.toml -q -o disk/out.exr; code=$?; cat disk/out.exr; exit $code";
+    let Some(output) = on_a_small_disk(folder, 500, script) else { return };
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    let expected = "disk/out.exr: cannot create a file in its folder: Read-only file system";
+    assert!(message.contains(expected), "{message}");
+    assert_eq!(stdout(&output), "the old picture");
+    // While it renders.
+    let script = "cp old.exr disk/out.exr; \
+                  $ALHAZEN render scene.toml -q -o disk/out.exr --samples 900 --checkpoint 0.02s & \
+                  while ! [ -f disk/out.checkpoint.exr ]; do sleep 0.01; done; \
+                  mount -o remount,ro disk || mount -o remount,ro disk || kill $!; \
+                  wait $!; code=$?; cat disk/out.exr; exit $code";
+    let Some(output) = on_a_small_disk(folder, 9000, script) else { return };
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("disk/out.exr: cannot"), "{message}");
+    assert!(message.contains("the picture was written to"), "{message}");
+    assert_eq!(stdout(&output), "the old picture");
+    assert!(only_file(&folder.join("tmp")) == std::fs::read(folder.join("whole.exr")).unwrap());
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::args::BenchArgs;
 use super::progress::{Progress, catch_interrupts};
 use super::units::grouped;
-use super::{Failure, Outcome, job, outputs, print};
+use super::{Failure, Outcome, outputs, prepare, print};
 use crate::accel::AccelKind;
 use crate::measure::bench::{
     Agreement, BenchError, BenchOptions, BenchReport, RayKind, Row, StructureKind,
@@ -28,11 +28,11 @@ pub(super) fn bench(args: &BenchArgs) -> Result<Outcome, Failure> {
     let scene_args = &args.scene;
     outputs::check_targets([scene_args.scene.as_path()], args.json.iter().chain(&args.html))?;
     catch_interrupts();
-    let pool = job::thread_pool(scene_args.threads)?;
-    let loaded = pool.install(|| job::load(scene_args))?;
+    let pool = prepare::thread_pool(scene_args.threads)?;
+    let loaded = pool.install(|| prepare::load(scene_args))?;
     // Nothing is built for the scene itself: Embree keeps the threads of the first build, which is to be
     // one with a single thread.
-    let scene = pool.install(|| job::build(scene_args, AccelKind::Brute, loaded, 0))?;
+    let scene = pool.install(|| prepare::build(scene_args, AccelKind::Brute, loaded, 0))?;
     let options = BenchOptions {
         structures: if args.accel.is_empty() { StructureKind::all() } else { args.accel.clone() },
         threads: pool.current_num_threads(),

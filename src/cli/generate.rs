@@ -3,7 +3,7 @@
 use super::args::GenerateArgs;
 use super::progress::{Progress, catch_interrupts, interrupted};
 use super::units::grouped;
-use super::{Failure, Outcome, job, print};
+use super::{Failure, Outcome, prepare, print};
 use crate::geometry::generate::GeneratedMesh;
 use crate::io::{WriteError, check_writable, write_mesh};
 
@@ -25,7 +25,7 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<Outcome, Failure> {
         !interrupted()
     };
     let written =
-        job::thread_pool(args.threads)?.install(|| write_mesh(&args.output, &mesh, &go_on));
+        prepare::thread_pool(args.threads)?.install(|| write_mesh(&args.output, &mesh, &go_on));
     progress.finish();
     written.map_err(|e| match e {
         WriteError::Interrupted => Failure::Interrupted,

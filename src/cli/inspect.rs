@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::args::InspectArgs;
 use super::report::peak_bytes;
 use super::units::{grouped, megabytes};
-use super::{Failure, Outcome, job, print};
+use super::{Failure, Outcome, prepare, print};
 use crate::film::PixelRect;
 use crate::scene::{IntegratorKind, Scene};
 
@@ -15,13 +15,13 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
     let args = &args.scene;
     super::progress::catch_interrupts();
     let clock = Instant::now();
-    let loaded = job::load(args)?;
+    let loaded = prepare::load(args)?;
     let read = clock.elapsed().as_secs_f64();
     let hash = loaded.hash;
     let clock = Instant::now();
-    let film = job::film_bytes(&PixelRect::whole(loaded.scene.image.size), false);
-    let pool = job::thread_pool(args.threads)?;
-    let scene = pool.install(|| job::build(args, kind, loaded, film))?;
+    let film = prepare::film_bytes(&PixelRect::whole(loaded.scene.image.size), false);
+    let pool = prepare::thread_pool(args.threads)?;
+    let scene = pool.install(|| prepare::build(args, kind, loaded, film))?;
     let build = clock.elapsed().as_secs_f64();
 
     let info = scene.accel.info();

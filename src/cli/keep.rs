@@ -4,9 +4,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::Failure;
-use super::job::warn;
 use super::units::Part;
+use super::{Failure, warn};
 use crate::film::PixelRect;
 use crate::io::{
     Attribute, AttributeValue, StateFile, StateView, WriteError, read_state, write_state,

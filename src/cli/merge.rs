@@ -1,26 +1,26 @@
 //! `alhazen merge`: parts of a render to one picture, with the same bits as in one piece.
 
+use std::path::Path;
 use std::time::Instant;
 
 use super::args::MergeArgs;
 use super::keep::{difference, part_range};
 use super::outputs::{Output, check_format, check_targets, write_all};
+use super::prepare::thread_pool;
 use super::units::{Part, parse_part};
-use super::{Failure, Outcome, job, print, report};
+use super::{Failure, Outcome, print, report};
 use crate::film::CenterLayers;
-use crate::io::{Attribute, AttributeValue, StateFile, read_state};
-use crate::render::{RenderState, Stop};
+use crate::io::{Attribute, AttributeValue, StateFile, StateHead, read_state, read_state_head};
+use crate::render::{BlockState, RenderState, Stop};
 
 /// What a part says of itself beside what all have in common.
 const OWN: [&str; 2] = ["alhazen.part", "alhazen.partOf"];
 
-/// A part, by the file that it came from.
-struct Piece {
+/// A part, as its file says.
+struct Piece<'a> {
+    path: &'a Path,
     file: String,
-    size: [u32; 2],
-    state: RenderState,
-    center: CenterLayers,
-    attributes: Vec<Attribute>,
+    head: StateHead,
     part: Part,
     /// Samples of the whole.
     samples: u32,
@@ -31,56 +31,34 @@ pub(super) fn merge(args: &MergeArgs, start: Instant) -> Result<Outcome, Failure
     let outputs: Vec<Output> =
         args.output.iter().cloned().map(Output::new).collect::<Result<_, _>>()?;
     check_targets(args.parts.iter().map(|p| p.as_path()), outputs.iter().map(|o| &o.path))?;
-    let pool = job::thread_pool(args.threads)?;
-    let bad = |message: String| Err(Failure::BadInput(message));
+    let pool = thread_pool(args.threads)?;
 
-    // One part after the other, so that only two are in memory: the first pass looks at headers alone
-    // where that were possible; states are joined in the order of their samples.
-    let mut pieces = Vec::new();
-    for path in &args.parts {
-        let file =
-            pool.install(|| read_state(path)).map_err(|e| Failure::BadInput(e.to_string()))?;
-        pieces.push(piece(path.display().to_string(), file)?);
-    }
-    pieces.sort_by_key(|piece| (piece.state.first_sample, piece.part.number));
-    let mut messages = Vec::new();
-    let first = &pieces[0];
-    for other in &pieces[1..] {
-        let is_common = |name: &str| name != OWN[0];
-        if let Some(what) = difference(
-            (&first.file, &first.attributes),
-            (&other.file, &other.attributes),
-            is_common,
-        ) {
-            messages.push(format!("{}: is of another render: {what}", other.file));
-        } else if first.size != other.size || first.state.window != other.state.window {
-            messages
-                .push(format!("{}: is of another size or crop than {}", other.file, first.file));
-        }
-    }
+    // What they say is looked at before any sums are read, so that only two parts are ever in memory.
+    let mut pieces: Vec<Piece<'_>> =
+        args.parts.iter().map(|path| pool.install(|| piece(path))).collect::<Result<_, _>>()?;
+    pieces.sort_by_key(|piece| (piece.head.samples.start, piece.part.number));
+    let mut messages = strangers(&pieces);
     if messages.is_empty() {
         messages = gaps(&pieces);
     }
     if !messages.is_empty() {
-        return bad(messages.join("\n"));
+        return Err(Failure::BadInput(messages.join("\n")));
     }
 
-    let (size, common) = (first.size, first.attributes.clone());
-    let mut pieces = pieces.into_iter();
-    let Some(Piece { mut state, center, .. }) = pieces.next() else {
-        return bad("no parts".to_owned());
-    };
-    for piece in pieces {
-        let file = piece.file;
-        let joined = pool.install(|| state.append(piece.state));
-        joined
-            .map_err(|_| Failure::BadInput(format!("{file}: does not follow the part before")))?;
+    let (first, others) = pieces.split_first().expect("the command line asks for one at least");
+    let (mut state, center) = pool.install(|| sums(first))?;
+    for piece in others {
+        let (next, _) = pool.install(|| sums(piece))?;
+        let joined = pool.install(|| state.append(next));
+        joined.map_err(|_| {
+            Failure::BadInput(format!("{}: does not follow the part before", piece.file))
+        })?;
     }
-    let mut film = pool.install(|| state.film(size));
+    let mut film = pool.install(|| state.film(first.head.size));
     film.layers.center = center;
     let samples = state.samples().end;
-    let mut attributes: Vec<Attribute> =
-        common.into_iter().filter(|a| !OWN.contains(&a.name.as_str())).collect();
+    let common = first.head.attributes.iter().filter(|a| !OWN.contains(&a.name.as_str()));
+    let mut attributes: Vec<Attribute> = common.cloned().collect();
     attributes.extend(report::outcome(&film, samples, Stop::Samples));
     if !args.quiet {
         let parts = args.parts.len();
@@ -91,42 +69,69 @@ pub(super) fn merge(args: &MergeArgs, start: Instant) -> Result<Outcome, Failure
     Ok(Outcome::Done)
 }
 
-fn piece(file: String, read: StateFile) -> Result<Piece, Failure> {
+fn piece(path: &Path) -> Result<Piece<'_>, Failure> {
+    let file = path.display().to_string();
+    let head = read_state_head(path).map_err(|e| Failure::BadInput(e.to_string()))?;
     let text = |name: &str| {
-        let found = read.attributes.iter().find(|a| a.name == name);
+        let found = head.attributes.iter().find(|a| a.name == name);
         match found.map(|a| &a.value) {
-            Some(AttributeValue::Text(text)) => Some(text.clone()),
+            Some(AttributeValue::Text(text)) => Some(text.as_str()),
             _ => None,
         }
     };
-    let part = text(OWN[0]).and_then(|text| parse_part(&text).ok());
+    let part = text(OWN[0]).and_then(|text| parse_part(text).ok());
     let samples = text(OWN[1]).and_then(|text| text.parse().ok());
     let (Some(part), Some(samples)) = (part, samples) else {
         let message =
             "is a checkpoint of a whole render; accepted: files of `alhazen render --part`";
         return Err(Failure::BadInput(format!("{file}: {message}")));
     };
-    let range = part_range(part, samples);
-    let (has, complete) = (read.state.samples(), range.as_ref());
-    let all_have = read.state.blocks.iter().all(|block| Some(block.sums.samples()) == complete);
-    if Some(&has) != complete || !all_have {
-        let message = format!(
-            "{file}: part {}/{} is not finished; go on with it by --resume",
-            part.number, part.count
-        );
-        return Err(Failure::BadInput(message));
+    let piece = Piece { path, file, head, part, samples };
+    if part_range(part, samples).as_ref() == Some(&piece.head.samples) {
+        Ok(piece)
+    } else {
+        Err(unfinished(&piece))
     }
-    let StateFile { size, state, center, attributes } = read;
-    Ok(Piece { file, size, state, center, attributes, part, samples })
+}
+
+fn unfinished(piece: &Piece<'_>) -> Failure {
+    let Piece { file, part: Part { number, count }, .. } = piece;
+    let message = "is not finished; go on with it by --resume";
+    Failure::BadInput(format!("{file}: part {number}/{count} {message}"))
+}
+
+/// The sums of a part, and what the middles of its pixels show.
+fn sums(piece: &Piece<'_>) -> Result<(RenderState, CenterLayers), Failure> {
+    let StateFile { state, center, .. } =
+        read_state(piece.path).map_err(|e| Failure::BadInput(e.to_string()))?;
+    let has_all = |block: &BlockState| *block.sums.samples() == piece.head.samples;
+    if state.blocks.iter().all(has_all) { Ok((state, center)) } else { Err(unfinished(piece)) }
+}
+
+/// Which parts are of another render than the first.
+fn strangers(pieces: &[Piece<'_>]) -> Vec<String> {
+    let Some((first, others)) = pieces.split_first() else { return Vec::new() };
+    let message = |other: &Piece<'_>| {
+        let is_common = |name: &str| name != OWN[0];
+        let [a, b] = [first, other].map(|p| (p.file.as_str(), p.head.attributes.as_slice()));
+        if let Some(what) = difference(a, b, is_common) {
+            Some(format!("{}: is of another render: {what}", other.file))
+        } else if (first.head.size, first.head.window) != (other.head.size, other.head.window) {
+            Some(format!("{}: is of another size or crop than {}", other.file, first.file))
+        } else {
+            None
+        }
+    };
+    others.iter().filter_map(message).collect()
 }
 
 /// What is missing, and what is there twice.
-fn gaps(pieces: &[Piece]) -> Vec<String> {
+fn gaps(pieces: &[Piece<'_>]) -> Vec<String> {
     let (count, samples) = (pieces[0].part.count, pieces[0].samples);
     let mut messages = Vec::new();
-    let (mut at, mut before) = (0, None::<&Piece>);
+    let (mut at, mut before) = (0, None::<&Piece<'_>>);
     for piece in pieces {
-        let range = piece.state.samples();
+        let range = &piece.head.samples;
         if piece.part.count != count {
             let (file, of) = (&piece.file, piece.part.count);
             messages.push(format!("{file}: is of {of} parts, and {} of {count}", pieces[0].file));

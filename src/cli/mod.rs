@@ -1,4 +1,4 @@
-//! The command line: flags as typed (`args.rs`), then what they mean together (`job.rs`), progress,
+//! The command line: flags as typed (`args.rs`), then what they mean together (a file for each command), progress,
 //! reports, exit codes. The only room that prints.
 //!
 //! Exit codes: 0 done, 1 the render failed or a comparison exceeded a limit, 2 bad input or usage, 130
@@ -9,11 +9,12 @@ mod bench;
 mod compare;
 mod generate;
 mod inspect;
-mod job;
 mod keep;
 mod merge;
 mod outputs;
+mod prepare;
 mod progress;
+mod render;
 mod report;
 mod units;
 mod watch;
@@ -68,6 +69,11 @@ fn tell(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "alhazen: {line}");
 }
 
+/// Says what the user may want to mend, and goes on.
+fn warn(text: &str) {
+    tell(&format!("warning: {text}"));
+}
+
 /// Runs the program on `arguments`, of which the first is its own name.
 pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let start = Instant::now();
@@ -80,7 +86,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         }
     };
     let result = match args.command {
-        Command::Render(args) => job::render(&args, start),
+        Command::Render(args) => render::render(&args, start),
         Command::Merge(args) => merge::merge(&args, start),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Compare(args) => compare::compare(&args),

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::args::FormatArgs;
-use super::job::warn;
-use super::{Failure, print};
+use super::{Failure, print, warn};
 use crate::film::Film;
 use crate::io::{
     Attribute, ExrOptions, PixelType, WriteError, check_writable, write_exr, write_hdr, write_png,
@@ -17,7 +16,7 @@ pub(super) struct Output {
     format: Format,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Format {
     Exr,
     Hdr,
@@ -99,7 +98,7 @@ pub(super) fn check_format(how: &FormatArgs) -> Result<(), Failure> {
 }
 
 /// Writes all of them. One that cannot be written does not keep the others from it, and no work is lost:
-/// where none could be, the picture goes to the folder for temporary files.
+/// where none of the best kind could be, the picture goes to the folder for temporary files.
 pub(super) fn write_all(
     outputs: &[Output],
     film: &Film,
@@ -107,25 +106,59 @@ pub(super) fn write_all(
     how: &FormatArgs,
     quiet: bool,
 ) -> Result<(), Failure> {
+    // EXR before HDR before PNG: what is lost in these is lost.
+    let Some(best) = outputs.iter().map(|output| output.format).min() else { return Ok(()) };
     let mut failures = Vec::new();
+    let mut rescued = outputs.iter().find(|output| output.format == best);
     for output in outputs {
         match output.write(&output.path, film, attributes, how, quiet) {
-            Ok(()) if quiet => {}
-            Ok(()) => print(&format!("{:>10}  {}", "wrote", output.path.display())),
+            Ok(()) => {
+                rescued = rescued.filter(|_| output.format != best);
+                tell_written(&output.path, quiet);
+            }
             Err(error) => failures.push(error.to_string()),
         }
     }
     if failures.is_empty() {
         return Ok(());
     }
-    if failures.len() == outputs.len()
-        && let Some(output) = outputs.first()
-        && let Some(path) = rescue_path(&output.path)
-        && output.write(&path, film, attributes, how, quiet).is_ok()
-    {
-        failures.push(format!("the picture was written to {} instead", path.display()));
+    if let Some(output) = rescued {
+        let write = |path: &Path| output.write(path, film, attributes, how, quiet);
+        failures.extend(rescue(&output.path, write));
     }
     Err(Failure::Failed(failures.join("\n")))
+}
+
+/// Writes a file; where it cannot be written, it goes to the folder for temporary files.
+pub(super) fn write_or_rescue(
+    path: &Path,
+    quiet: bool,
+    write: impl Fn(&Path) -> Result<(), WriteError>,
+) -> Result<(), Failure> {
+    match write(path) {
+        Ok(()) => {
+            tell_written(path, quiet);
+            Ok(())
+        }
+        Err(error) => {
+            let failures: Vec<_> =
+                [error.to_string()].into_iter().chain(rescue(path, write)).collect();
+            Err(Failure::Failed(failures.join("\n")))
+        }
+    }
+}
+
+fn tell_written(path: &Path, quiet: bool) {
+    if !quiet {
+        print(&format!("{:>10}  {}", "wrote", path.display()));
+    }
+}
+
+/// Writes to the folder for temporary files what could not be written to `path`, and says so.
+fn rescue(path: &Path, write: impl Fn(&Path) -> Result<(), WriteError>) -> Option<String> {
+    let path = rescue_path(path)?;
+    write(&path).ok()?;
+    Some(format!("the picture was written to {} instead", path.display()))
 }
 
 /// Where a picture goes that cannot be written where it should.

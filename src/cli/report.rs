@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::units::{grouped, megabytes};
-use super::{Failure, job::Phases, print};
+use super::{Failure, print, render::Phases};
 use crate::accel::AccelInfo;
 use crate::film::{Aov, Film, SamplingError};
 use crate::io::{Attribute, AttributeValue, matte_attributes};

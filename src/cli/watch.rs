@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::job::warn;
 use super::keep::Keeper;
 use super::progress::{Progress, interrupted};
+use super::warn;
 use crate::film::Film;
 use crate::io::{TevImage, ToneMap, write_png};
 use crate::render::{Observer, Snapshot};

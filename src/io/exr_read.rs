@@ -69,56 +69,79 @@ fn decode_layer(path: &Path, bytes: &[u8]) -> Result<Picture, ReadError> {
     Ok(Picture { size, extent, origin: Some(origin), pixels })
 }
 
-/// All channels of the only part of a file.
-pub(super) struct ExrChannels {
+/// What the header of the only part of a file says.
+pub(super) struct ExrHead {
     /// Size of the whole picture.
     pub(super) size: [u32; 2],
     /// The pixels that it holds, across and down.
     pub(super) extent: [u32; 2],
     /// Where the first of them lies in the whole.
     pub(super) origin: [i32; 2],
-    /// What else the header says, by name.
+    /// What else it says, by name.
     pub(super) attributes: Vec<Attribute>,
-    /// Names and bits of channels of 32 bits a pixel, row by row; others are left out.
-    pub(super) channels: Vec<(String, Vec<u32>)>,
 }
 
-/// Reads all channels of 32 bits of an EXR file.
+/// Names and bits of channels of 32 bits a pixel, row by row.
+pub(super) type WideChannels = Vec<(String, Vec<u32>)>;
+
+/// Reads the header of an EXR file alone.
 ///
 /// # Errors
 /// [`ReadError`] where the file cannot be read, is not a sound EXR file, or has several parts.
-pub(super) fn read_channels(path: &Path) -> Result<ExrChannels, ReadError> {
+pub(super) fn read_head(path: &Path) -> Result<ExrHead, ReadError> {
+    with_only_part(path, |parts| Ok(head(parts)?.0))
+}
+
+/// Reads the header and all channels of 32 bits of an EXR file.
+///
+/// # Errors
+/// [`ReadError`] where the file cannot be read, is not a sound EXR file, or has several parts.
+pub(super) fn read_channels(path: &Path) -> Result<(ExrHead, WideChannels), ReadError> {
+    with_only_part(path, |parts| {
+        let (head, count) = head(parts)?;
+        let list = &parts.meta.headers[0].channels.list;
+        let is_wide = |kind: SampleType| kind.bytes_per_sample() == 4;
+        let wanted: Vec<usize> =
+            (0..list.len()).filter(|&i| is_wide(list[i].sample_type)).collect();
+        let mut channels = WideChannels::new();
+        for &index in &wanted {
+            channels.push((list[index].name.to_string(), reserve(path, count, 0u32)?));
+        }
+        parts.decode(0, &wanted, |first, k, _, values| {
+            let row = &mut channels[k].1[first..first + values.len() / 4];
+            for (to, value) in row.iter_mut().zip(values.as_chunks::<4>().0) {
+                *to = u32::from_ne_bytes(*value);
+            }
+        })?;
+        Ok((head, channels))
+    })
+}
+
+fn with_only_part<T>(
+    path: &Path,
+    read: impl FnOnce(&Parts<'_>) -> Result<T, ReadError>,
+) -> Result<T, ReadError> {
     let bytes = Source::open(path)?.read_from(0)?;
     if !bytes.starts_with(&SIGNATURE) {
         return Err(ReadError::file(path, "not an EXR file"));
     }
-    let decoded = catch_unwind(AssertUnwindSafe(|| decode_channels(path, &bytes)));
+    let decoded = catch_unwind(AssertUnwindSafe(|| {
+        let parts = Parts::read(path, &bytes)?;
+        match parts.meta.headers.as_slice() {
+            [header] if header.deep => {
+                Err(ReadError::file(path, "it holds deep data; accepted: one value a pixel"))
+            }
+            [_] => read(&parts),
+            _ => Err(ReadError::file(path, "it has several parts; accepted: one")),
+        }
+    }));
     decoded.unwrap_or_else(|_| Err(unsound(path, "its blocks cannot be decoded")))
 }
 
-fn decode_channels(path: &Path, bytes: &[u8]) -> Result<ExrChannels, ReadError> {
-    let parts = Parts::read(path, bytes)?;
-    let [header] = parts.meta.headers.as_slice() else {
-        return Err(ReadError::file(path, "it has several parts; accepted: one"));
-    };
-    if header.deep {
-        return Err(ReadError::file(path, "it holds deep data; accepted: one value a pixel"));
-    }
+/// What the header of the first part says, and how many pixels it holds.
+fn head(parts: &Parts<'_>) -> Result<(ExrHead, usize), ReadError> {
     let (extent, count) = parts.check(0)?;
-    let is_wide = |kind: SampleType| kind.bytes_per_sample() == 4;
-    let list = header.channels.list.iter().enumerate();
-    let wanted: Vec<usize> = list.filter(|(_, c)| is_wide(c.sample_type)).map(|(i, _)| i).collect();
-    let mut channels = Vec::new();
-    for &index in &wanted {
-        let name = header.channels.list[index].name.to_string();
-        channels.push((name, reserve(path, count, 0u32)?));
-    }
-    parts.decode(0, &wanted, |first, k, _, values| {
-        let row = &mut channels[k].1[first..first + values.len() / 4];
-        for (to, value) in row.iter_mut().zip(values.as_chunks::<4>().0) {
-            *to = u32::from_ne_bytes(*value);
-        }
-    })?;
+    let header = &parts.meta.headers[0];
     let attributes = header.own_attributes.other.iter().filter_map(|(name, value)| {
         let value = match value {
             ExrValue::Text(text) => AttributeValue::Text(text.to_string()),
@@ -132,7 +155,7 @@ fn decode_channels(path: &Path, bytes: &[u8]) -> Result<ExrChannels, ReadError> 
     let mut attributes: Vec<Attribute> = attributes.collect();
     attributes.sort_unstable_by(|a, b| a.name.cmp(&b.name));
     let (size, origin) = windows(header);
-    Ok(ExrChannels { size, extent, origin, attributes, channels })
+    Ok((ExrHead { size, extent, origin, attributes }, count))
 }
 
 /// The size of the whole picture, and where a part's first pixel lies in it.

@@ -56,5 +56,5 @@ pub use picture::{read_picture, read_png};
 pub use png::{ToneMap, write_png};
 pub use radiance::write_hdr;
 pub use scene_file::{LoadError, LoadOptions, LoadedScene, load_scene};
-pub use state::{StateFile, StateView, read_state, write_state};
+pub use state::{StateFile, StateHead, StateView, read_state, read_state_head, write_state};
 pub use tev::TevImage;

@@ -4,11 +4,12 @@
 //! samples that each pixel has, where its pass ends, and the nodes of its sums ([`BlockSums`]), each f64
 //! as two halves of its bits. What a node's place in its tree is follows from the number of samples.
 
+use std::ops::Range;
 use std::path::Path;
 
 use super::error::{ReadError, WriteError};
 use super::exr::{Channel, ExrCompression, ExrOptions, write_channels};
-use super::exr_read::read_channels;
+use super::exr_read::{ExrHead, read_channels, read_head};
 use super::layers::{center_channels, center_from};
 use super::output::{Attribute, AttributeValue};
 use crate::film::{
@@ -44,6 +45,19 @@ pub struct StateView<'a> {
     pub rays: &'a RayCounts,
     /// Samples that were left out.
     pub non_finite: &'a NonFinite,
+}
+
+/// What the header of a file of a state says.
+#[derive(Debug)]
+pub struct StateHead {
+    /// Size of the whole picture.
+    pub size: [u32; 2],
+    /// The pixels that it holds.
+    pub window: PixelRect,
+    /// The samples that every pixel has, unless the last pass was cut short.
+    pub samples: Range<u32>,
+    /// What else it says, in alphabetical order.
+    pub attributes: Vec<Attribute>,
 }
 
 /// What a file of a state holds.
@@ -221,37 +235,84 @@ pub fn write_state(
     write_channels(path, view.film.size, &window, channels, &attributes, &options).map(drop)
 }
 
+/// The header of a file of a state: what it says for us, and to all.
+struct Head<'a> {
+    path: &'a Path,
+    read: ExrHead,
+}
+
+impl Head<'_> {
+    fn unsound(&self, what: impl std::fmt::Display) -> ReadError {
+        ReadError::file(self.path, format!("not a sound state: {what}"))
+    }
+
+    fn check(&self) -> Result<(), ReadError> {
+        match self.read.attributes.iter().find(|a| a.name == VERSION.0) {
+            Some(Attribute { value: AttributeValue::Integer(version), .. })
+                if *version == VERSION.1 =>
+            {
+                Ok(())
+            }
+            Some(_) => Err(self.unsound("its format is of another version of alhazen")),
+            None => {
+                let message = "not a part or checkpoint of a render; accepted: what `alhazen \
+                               render` wrote with --part or --checkpoint";
+                Err(ReadError::file(self.path, message))
+            }
+        }
+    }
+
+    fn text(&self, name: &str) -> Result<&str, ReadError> {
+        let found = self.read.attributes.iter().find(|a| a.name == name);
+        match found.map(|a| &a.value) {
+            Some(AttributeValue::Text(text)) => Ok(text.as_str()),
+            _ => Err(self.unsound(format!("the attribute {name} is missing"))),
+        }
+    }
+
+    fn number(&self, name: &str) -> Result<u32, ReadError> {
+        let parsed = self.text(name)?.parse();
+        parsed.map_err(|_| self.unsound(format!("the attribute {name} is no number")))
+    }
+
+    fn window(&self) -> Result<PixelRect, ReadError> {
+        window_of(self.read.origin, self.read.extent).ok_or_else(|| self.unsound("its window"))
+    }
+
+    /// What it says of the render, and not of how far that is.
+    fn others(&self) -> Vec<Attribute> {
+        let is_ours = |a: &Attribute| a.name.starts_with(VERSION.0);
+        self.read.attributes.iter().filter(|a| !is_ours(a)).cloned().collect()
+    }
+}
+
+/// Reads what a file that [`write_state`] wrote says of itself, without its sums.
+///
+/// # Errors
+/// [`ReadError`] where the file cannot be read, or is no state.
+pub fn read_state_head(path: &Path) -> Result<StateHead, ReadError> {
+    let head = Head { path, read: read_head(path)? };
+    head.check()?;
+    Ok(StateHead {
+        size: head.read.size,
+        window: head.window()?,
+        samples: head.number(FIRST)?..head.number(PASSED)?,
+        attributes: head.others(),
+    })
+}
+
 /// Reads a state that [`write_state`] wrote.
 ///
 /// # Errors
 /// [`ReadError`] where the file cannot be read, or holds no sound state.
 pub fn read_state(path: &Path) -> Result<StateFile, ReadError> {
-    let no_state = || {
-        let message = "not a part or checkpoint of a render; accepted: what `alhazen render` wrote \
-                       with --part or --checkpoint";
-        ReadError::file(path, message)
-    };
-    let unsound = |what: &str| ReadError::file(path, format!("not a sound state: {what}"));
-    let file = read_channels(path)?;
-    match file.attributes.iter().find(|a| a.name == VERSION.0) {
-        Some(Attribute { value: AttributeValue::Integer(version), .. })
-            if *version == VERSION.1 => {}
-        Some(_) => return Err(unsound("its format is of another version of alhazen")),
-        None => return Err(no_state()),
-    }
-    let text = |name: &str| {
-        let found = file.attributes.iter().find(|a| a.name == name);
-        match found.map(|a| &a.value) {
-            Some(AttributeValue::Text(text)) => Ok(text.as_str()),
-            _ => Err(unsound(&format!("the attribute {name} is missing"))),
-        }
-    };
-    let number = |name: &str| {
-        let parsed = text(name)?.parse::<u32>();
-        parsed.map_err(|_| unsound(&format!("the attribute {name} is no number")))
-    };
-    let first_sample = number(FIRST)?;
-    let passed = number(PASSED)?;
+    let (read, channels) = read_channels(path)?;
+    let head = Head { path, read };
+    head.check()?;
+    let unsound = |what: &str| head.unsound(what);
+    let first_sample = head.number(FIRST)?;
+    let passed = head.number(PASSED)?;
+    let text = |name: &str| head.text(name);
     let rays = parse_rays(text(RAYS)?).ok_or_else(|| unsound("its numbers of rays"))?;
     let non_finite = parse_non_finite(text(NON_FINITE)?).ok_or_else(|| unsound(NON_FINITE))?;
 
@@ -261,9 +322,9 @@ pub fn read_state(path: &Path) -> Result<StateFile, ReadError> {
         .collect();
     let layers = layers.ok_or_else(|| unsound("its layers"))?;
 
-    let window = window_of(file.origin, file.extent).ok_or_else(|| unsound("its window"))?;
+    let window = head.window()?;
     let plane = |name: &str| {
-        let found = file.channels.iter().find(|(n, _)| n == name);
+        let found = channels.iter().find(|(n, _)| n == name);
         found.map(|(_, values)| values.as_slice())
     };
     let need =
@@ -343,9 +404,7 @@ pub fn read_state(path: &Path) -> Result<StateFile, ReadError> {
     let center = center_from(plane);
     let state =
         RenderState { window, first_sample, passed, blocks, rays, non_finite, layers, mattes };
-    let is_ours = |a: &Attribute| a.name.starts_with(VERSION.0);
-    let attributes = file.attributes.iter().filter(|a| !is_ours(a)).cloned().collect();
-    Ok(StateFile { size: file.size, state, center, attributes })
+    Ok(StateFile { size: head.read.size, state, center, attributes: head.others() })
 }
 
 fn window_of(origin: [i32; 2], extent: [u32; 2]) -> Option<PixelRect> {
