@@ -4,7 +4,7 @@
 CARGO ?= cargo
 SETUP := ./scripts/setup.sh
 
-.PHONY: help setup build demo test verify bench fuzz lint doc clean
+.PHONY: help setup build demo test verify bench slurm fuzz lint doc clean
 
 help: ## Lists these targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 14
@@ -24,11 +24,14 @@ test: ## Runs every test, with and without Embree
 	PROPTEST_RNG_SEED=1 $(CARGO) test --locked
 	PROPTEST_RNG_SEED=1 $(CARGO) test --locked --no-default-features
 
-verify: test ## Runs what takes longer: many more random rays and scenes, others each time
+verify: test slurm ## Runs what takes longer: many more random rays, scenes, seeds and kills, others each time
 	ALHAZEN_VERIFY=1 $(CARGO) test --locked --release
 
+slurm: build ## Tries the job array on a Slurm of one node, which it sets up (as root) and ends
+	./scripts/slurm/try.sh
+
 bench: setup ## Measures ray queries, the variants, every option, and other renderers
-	$(CARGO) bench --locked
+	$(CARGO) bench --locked --features crates
 
 fuzz: ## Feeds every parser with broken input, SECONDS (600) each; ends at the first finding
 	@$(SETUP) fuzz

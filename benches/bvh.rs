@@ -1,7 +1,9 @@
 //! Our own hierarchy against Embree: ratios within one run, with the targets beside them.
 //!
-//! `cargo bench --bench bvh` prints, for a terrain of a million triangles at both rungs of precision, the
-//! median over interleaved rounds of Embree's time by ours, for camera, shadow and diffuse rays.
+//! `cargo bench --bench bvh` prints, for a terrain of a million triangles and for a closed shell with blobs
+//! seen from within, at each rung of precision that both have, the median over interleaved rounds of
+//! Embree's time by ours, for camera, shadow and diffuse rays. With `--features crates` it also prints what
+//! the crates `obvhs` and `bvh` reach, with the hits that they get wrong.
 #![allow(clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
 
 mod common;
@@ -12,14 +14,84 @@ use std::time::Instant;
 use alhazen::accel::{
     AccelKind, BuildOptions, BvhAccel, EmbreeAccel, Precision, RayBlock, RayQuery, World,
 };
+use alhazen::camera::Projection;
+use alhazen::film::Filter;
+use alhazen::geometry::TriangleMesh;
+use alhazen::geometry::generate::{GeneratedKind, GeneratedMesh};
 use alhazen::math::Ray;
-use common::{ROUNDS, camera_blocks, interleaved, median, ratio, terrain};
-use glam::Vec3;
+use alhazen::scene::{CameraDesc, Location, ObjectDesc, PlaceDesc, Scene, SceneDesc, ShapeDesc};
+use common::{ROUNDS, SIZE, camera_blocks, interleaved, median, ratio, terrain};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 fn main() {
-    let scene = terrain(708);
-    let camera: Vec<RayBlock> = camera_blocks(&scene, 0).into_iter().map(|(b, _)| b).collect();
+    for (name, scene) in [("terrain", terrain(708)), ("blobs, from within", blobs())] {
+        println!("\n{name}, {} triangles", scene.requirements.triangles);
+        ours(&scene);
+        #[cfg(feature = "crates")]
+        crates(&scene);
+    }
+}
+
+/// A displaced closed shell with displaced closed blobs in it, seen from within.
+fn blobs() -> Scene {
+    let mesh = GeneratedMesh::new(GeneratedKind::Blobs, 1_000_000, 0).expect("a sound number");
+    let positions = (0..mesh.vertex_count()).flat_map(|i| mesh.vertex(i)).collect();
+    let triangles = (0..mesh.triangle_count()).map(|i| mesh.triangle(i)).collect();
+    let mesh = TriangleMesh::new(positions, triangles);
+    let mut desc = SceneDesc { meshes: vec![mesh], ..SceneDesc::default() };
+    desc.image.size = SIZE;
+    desc.settings.filter = Filter::Box;
+    desc.objects.push(ObjectDesc::new(ShapeDesc::Mesh(0), None));
+    desc.camera = Some(CameraDesc {
+        at: Location::default(),
+        projection: Projection::Perspective { fov: 70f64.to_radians() },
+        place: Some(PlaceDesc::LookAt {
+            eye: DVec3::new(0.3, 0.2, 8.0),
+            target: DVec3::ZERO,
+            up: DVec3::Y,
+        }),
+        lens: None,
+    });
+    Scene::build_quietly(desc, AccelKind::default()).expect("a sound scene")
+}
+
+/// Rows of other crates beside ours, as `alhazen bench` measures them, with one thread.
+#[cfg(feature = "crates")]
+fn crates(scene: &Scene) {
+    use alhazen::measure::bench::{BenchOptions, RayKind, StructureKind, bench, total};
+
+    let structures = StructureKind::all();
+    let is_wanted = |kind: &StructureKind| !["bsp", "octree", "brute"].contains(&kind.name());
+    let options = BenchOptions {
+        structures: structures.into_iter().filter(is_wanted).collect(),
+        threads: 1,
+        seconds: 2.0,
+        rounds: 7,
+        rays: 1 << 18,
+    };
+    let report = bench(scene, &options, &()).expect("a sound scene");
+    println!(
+        "single rays of accelerators and crates, robust where they know it, of Embree; wrong hits:"
+    );
+    for row in report.rows.iter().filter(|row| row.not_measured.is_none()) {
+        let ratio = |kind: RayKind| {
+            let speed = row.speeds.iter().find(|s| s.kind == kind);
+            speed.map_or_else(String::new, |s| format!("{} {:.2}  ", kind.name(), s.ratio))
+        };
+        let wrong = total(&row.against_f64);
+        println!(
+            "{:>16}  {}{} of {} wrong",
+            row.name,
+            RayKind::ALL.map(ratio).concat(),
+            wrong.wrong(),
+            wrong.rays
+        );
+    }
+}
+
+fn ours(scene: &Scene) {
+    let camera: Vec<RayBlock> = camera_blocks(scene, 0).into_iter().map(|(b, _)| b).collect();
     let world = scene.world();
     for precision in Precision::ALL {
         let options = |kind| BuildOptions { kind, precision, ..BuildOptions::default() };

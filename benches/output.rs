@@ -5,6 +5,9 @@
 
 #![allow(missing_docs, clippy::print_stdout, reason = "a program that prints a table")]
 
+mod common;
+
+use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
@@ -15,6 +18,7 @@ use alhazen::io::{
 };
 use alhazen::render::{RenderJob, render};
 use alhazen::scene::Scene;
+use common::{ROUNDS, interleaved, median, ratio};
 
 fn scene(size: [u32; 2], samples: u32) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/showcase.toml");
@@ -22,11 +26,6 @@ fn scene(size: [u32; 2], samples: u32) -> Scene {
     loaded.scene.image.size = size;
     loaded.scene.settings.samples = samples;
     Scene::build_quietly(loaded.scene, AccelKind::default()).expect("it builds")
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// Size in MB and seconds of writing.
@@ -72,24 +71,16 @@ fn main() {
     );
     let scene = scene([1920, 1080], 4);
     let time = |layers: &[Aov]| {
-        let clock = Instant::now();
         let job = RenderJob { layers: layers.to_vec(), ..RenderJob::default() };
-        let rendered = render(&scene, &job, &());
-        assert!(rendered.samples == 4);
-        clock.elapsed().as_secs_f64()
+        black_box(render(&scene, &job, &()));
     };
     let mut sets: Vec<(&str, Vec<Aov>)> = vec![("none", Vec::new())];
     sets.extend(Aov::ALL.iter().map(|aov| (aov.name(), vec![*aov])));
     sets.push(("all", Aov::ALL.to_vec()));
-    let mut ratios = vec![Vec::new(); sets.len()];
-    for _ in 0..5 {
-        let base = time(&[]);
-        for ((_, layers), ratios) in sets.iter().zip(&mut ratios) {
-            ratios.push(time(layers) / base);
-        }
-    }
-    println!("| layer | ratio |\n|---|---|");
-    for ((name, _), ratios) in sets.into_iter().zip(ratios) {
-        println!("| `{name}` | {:.2} |", median(ratios));
+    println!("| layer | ratio | interval |\n|---|---|---|");
+    for (name, layers) in sets {
+        let rounds = interleaved(&|| time(&layers), &|| time(&[]), ROUNDS);
+        let (x, [low, high]) = ratio(&rounds);
+        println!("| `{name}` | {x:.2} | {low:.2} to {high:.2} |");
     }
 }

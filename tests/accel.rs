@@ -345,6 +345,9 @@ fn robust_loses_no_ray_at_edges() {
     const AT_VERTEX: [f64; 2] = [0.0, 0.0];
     assert_eq!(lost(AccelKind::Bvh, Precision::Robust, WITHIN), 0);
     assert_eq!(lost(AccelKind::Bvh, Precision::Robust, AT_VERTEX), 0);
+    for ends in [WITHIN, AT_VERTEX] {
+        assert_eq!(lost(AccelKind::default(), Precision::Exact, ends), 0);
+    }
     eprintln!("lost by bvh fast: {}", lost(AccelKind::Bvh, Precision::Fast, WITHIN));
     #[cfg(feature = "embree")]
     {

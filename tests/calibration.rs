@@ -124,8 +124,10 @@ fn the_true_error_lies_in_the_stated_interval() {
         ("soft shadows", soft_shadows),
         ("large mesh", large_mesh),
     ];
-    let (seeds, many) = if verify() { (50, 1 << 15) } else { (6, 1 << 11) };
+    let (seeds, many) = if verify() { (50, 1 << 13) } else { (6, 1 << 11) };
     let mut wrong = Vec::new();
+    // Inside, and of how many.
+    let mut all = [0, 0];
     for (name, make) in scenes {
         let scene = make(folder.path());
         let render = |seed, rules| {
@@ -154,6 +156,7 @@ fn the_true_error_lies_in_the_stated_interval() {
             }
             let ratio: f64 = (stated / shown).sqrt();
             let share = f64::from(inside) / seeds as f64;
+            all = [all[0] + inside, all[1] + seeds as u32];
             eprintln!(
                 "{name}, {rule}: true error {:.3} %, stated by true {ratio:.3}, interval {:.1} %, \
                  {inside} of {seeds} inside",
@@ -167,6 +170,9 @@ fn the_true_error_lies_in_the_stated_interval() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+    let share = f64::from(all[0]) / f64::from(all[1]);
+    eprintln!("{:.1} % inside in all", 100.0 * share);
+    assert!((if verify() { 0.9..=0.99 } else { 0.8..=1.0 }).contains(&share), "{share}");
 }
 
 /// Samples where the error is: fewer in all for the same error, and what that does to the picture.
@@ -175,7 +181,7 @@ fn adaptive_sampling_is_cheaper_and_nearly_unbiased() {
     let folder = tempfile::tempdir().unwrap();
     let scenes: [(&str, Make); 3] =
         [("showcase", showcase), ("mirrors and glass", spheres), ("soft shadows", soft_shadows)];
-    let (seeds, many) = if verify() { (50, 1 << 15) } else { (4, 1 << 11) };
+    let (seeds, many) = if verify() { (50, 1 << 13) } else { (4, 1 << 11) };
     for (name, make) in scenes {
         let scene = make(folder.path());
         let render = |seed, rules, is_adaptive| {

@@ -1,6 +1,6 @@
 //! Our EXR files as other programs read them: OpenEXR's `exrheader`, OpenImageIO's `oiiotool` and
 //! `idiff`, and Python's package `OpenEXR`, which `make test` installs.
-#![allow(missing_docs, reason = "a test program")]
+#![allow(missing_docs, clippy::print_stderr, reason = "a test program")]
 
 use std::path::Path;
 use std::process::Command;

@@ -1,5 +1,5 @@
 //! That no work is lost: checkpoints, kills, parts and merging, and files that cannot be written.
-#![allow(missing_docs, reason = "a test program")]
+#![allow(missing_docs, clippy::print_stderr, reason = "a test program")]
 
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};

@@ -86,7 +86,7 @@ impl EmbreeAccel {
         };
         let flags = match options.precision {
             Precision::Fast => SceneFlags::NONE,
-            Precision::Robust => SceneFlags::ROBUST,
+            Precision::Robust | Precision::Exact => SceneFlags::ROBUST,
         };
         let flags = if options.compact { flags | SceneFlags::COMPACT } else { flags };
         // Every group counts by its primitives towards the progress.
@@ -130,7 +130,7 @@ impl EmbreeAccel {
         let scene = commit(builder, size(&world.root))?;
         Ok(Self {
             scene,
-            packet_width: device.packet_width(),
+            packet_width: if options.single_rays { 1 } else { device.packet_width() },
             coherence: coherence(world),
             sets,
             first_set,

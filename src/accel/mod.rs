@@ -103,25 +103,28 @@ impl Hit {
     }
 }
 
-/// How far a build may go to make hits exact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// How far a build may go to make hits exact: from less to more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Precision {
     /// Embree's defaults: some rays are lost at edges and far from the origin.
     Fast,
     /// Watertight at edges (Embree's not quite at vertices), accurate far from the origin.
     #[default]
     Robust,
+    /// Watertight at edges and vertices. Embree has no such queries: those of our own hierarchy are.
+    Exact,
 }
 
 impl Precision {
     /// All rungs of the ladder.
-    pub const ALL: [Self; 2] = [Self::Fast, Self::Robust];
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Robust, Self::Exact];
 
     /// The name in scene files and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fast => "fast",
             Self::Robust => "robust",
+            Self::Exact => "exact",
         }
     }
 }
@@ -219,6 +222,8 @@ pub struct BuildOptions {
     pub threads: Option<usize>,
     /// Whether the hierarchy takes half the memory, and longer to trace. Embree only.
     pub compact: bool,
+    /// Whether rays that run close together are traced one by one all the same: to see what packets bring.
+    pub single_rays: bool,
     /// Bytes that the structure may hold.
     pub memory_limit: Option<u64>,
     /// Bytes that there are for it.
@@ -306,6 +311,16 @@ macro_rules! with_accel {
 }
 pub(crate) use with_accel;
 impl BuildOptions {
+    /// The structure that is built: Embree's loses some rays that meet a vertex, so that
+    /// [`Precision::Exact`] is for our own.
+    pub fn built_kind(&self) -> AccelKind {
+        match self.kind {
+            #[cfg(feature = "embree")]
+            AccelKind::Embree if self.precision == Precision::Exact => AccelKind::Bvh,
+            kind => kind,
+        }
+    }
+
     /// Decides by what a structure is expected to take whether it will be `compact`, and refuses what
     /// does not fit into [`BuildOptions::memory_limit`] or [`BuildOptions::free`] either way.
     ///
@@ -345,7 +360,7 @@ impl Accel {
         options: &BuildOptions,
         progress: &(dyn Fn(f64) -> bool + Sync),
     ) -> Result<Self, AccelError> {
-        match options.kind {
+        match options.built_kind() {
             #[cfg(feature = "embree")]
             AccelKind::Embree => EmbreeAccel::build(world, options, progress).map(Self::Embree),
             AccelKind::Bvh => BvhAccel::build(world, options, progress).map(Self::Bvh),

@@ -31,6 +31,7 @@ Start here:
   alhazen inspect scene.toml                  what it holds, what it requires, what it costs
   alhazen compare out.exr reference.exr       how far a picture is from a reference
   alhazen bench bunny.ply --html bench.html   how fast and how right accelerators are on it
+  alhazen trade scene.toml --error 1% --html trade.html    which settings reach 1 %, soonest
   alhazen generate terrain --triangles 10M -o terrain.ply
 
 Exit codes: 0 done, 1 the render failed or a comparison exceeded a limit, 2 bad input or usage, 130 interrupted
@@ -54,6 +55,8 @@ pub(super) enum Command {
     Compare(CompareArgs),
     /// Measure accelerators on the rays of a scene: build time, memory, speed, agreement
     Bench(BenchArgs),
+    /// Measure what speed costs in accuracy on a scene, knob by knob; recommend settings for an error or a time
+    Trade(TradeArgs),
     /// Write a test mesh of any size, the same for the same seed
     Generate(GenerateArgs),
 }
@@ -90,7 +93,7 @@ pub(super) struct SceneArgs {
     pub(super) max_depth: Option<u32>,
 
     /// How exact ray queries are: `fast` loses some rays at edges and far from the origin, `robust` only a
-    /// few that meet a vertex exactly
+    /// few that meet a vertex exactly, `exact` none (always our own hierarchy)
     #[arg(long, value_name = "NAME", value_parser = by_name(&Precision::ALL, Precision::name))]
     pub(super) precision: Option<Precision>,
 
@@ -135,6 +138,10 @@ pub(super) struct AccelArgs {
     #[arg(id = "accel", long, value_name = "NAME", default_value = AccelKind::ALL[0].name(),
           value_parser = by_name(AccelKind::ALL, AccelKind::name))]
     pub(super) kind: AccelKind,
+
+    /// Traces rays that run close together one by one too: to see what packets bring
+    #[arg(long)]
+    pub(super) single_rays: bool,
 }
 
 #[derive(Debug, clap::Args)]
@@ -355,6 +362,74 @@ pub(super) struct BenchArgs {
     /// Write it as a page with bar charts, which needs nothing else
     #[arg(long, value_name = "FILE.html")]
     pub(super) html: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+A reference is rendered first, with nothing cut short that costs accuracy; then the scene as it stands, with \
+other numbers of samples, and with each choice of the knobs that matter to it. Errors are relative, as `render` \
+states them, bias included. docs/trade.md tells what is measured, and how.")]
+pub(super) struct TradeArgs {
+    #[command(flatten)]
+    pub(super) scene: SceneArgs,
+
+    #[command(flatten)]
+    pub(super) accel: AccelArgs,
+
+    /// Find settings for this relative error, bias included, as in 1% or 0.01; repeatable. Exit code 1
+    /// where none are found
+    #[arg(long, value_name = "SHARE", value_parser = parse_share)]
+    pub(super) error: Vec<f64>,
+
+    /// Find settings for this time from start to file written, as in 30s; repeatable
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    pub(super) time: Vec<Duration>,
+
+    /// Compare with this picture, .exr or .png, of the same size
+    #[arg(long, value_name = "FILE")]
+    pub(super) reference: Option<PathBuf>,
+
+    /// Samples per pixel of the reference; 16 times those of the scene where not given, 256 to 4096
+    #[arg(long, value_name = "N", conflicts_with = "reference",
+          value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
+    pub(super) reference_samples: Option<u32>,
+
+    /// Interleaved rounds of which medians of times are taken
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub(super) rounds: u16,
+
+    /// Folder in which references are kept; alhazen in the user's folder for caches where not given
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) cache: Option<PathBuf>,
+
+    /// Neither keeps references nor uses one that is kept
+    #[arg(long, conflicts_with = "cache")]
+    pub(super) no_cache: bool,
+
+    /// Write a page with charts and pictures, which needs nothing else
+    #[arg(long, value_name = "FILE.html")]
+    pub(super) html: Option<PathBuf>,
+
+    /// Write what was measured as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) json: Option<PathBuf>,
+
+    /// Write it as comma-separated values
+    #[arg(long, value_name = "FILE.csv")]
+    pub(super) csv: Option<PathBuf>,
+}
+
+impl TradeArgs {
+    /// The folder that references are kept in; none where there is none.
+    pub(super) fn cache(&self) -> Option<PathBuf> {
+        if self.no_cache {
+            return None;
+        }
+        let folder =
+            |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+        let user = || folder("XDG_CACHE_HOME").or_else(|| Some(folder("HOME")?.join(".cache")));
+        self.cache.clone().or_else(|| Some(user()?.join("alhazen")))
+    }
 }
 
 /// A parser of one of the structures that can be measured.

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::args::BenchArgs;
+use super::args::{AccelArgs, BenchArgs};
 use super::progress::{Progress, catch_interrupts};
 use super::units::grouped;
 use super::{Failure, Outcome, outputs, prepare, print};
@@ -30,9 +30,10 @@ pub(super) fn bench(args: &BenchArgs) -> Result<Outcome, Failure> {
     catch_interrupts();
     let pool = prepare::thread_pool(scene_args.threads)?;
     let loaded = pool.install(|| prepare::load(scene_args))?;
+    let brute = AccelArgs { kind: AccelKind::Brute, single_rays: false };
     // Nothing is built for the scene itself: Embree keeps the threads of the first build, which is to be
     // one with a single thread.
-    let scene = pool.install(|| prepare::build(scene_args, AccelKind::Brute, loaded, 0))?;
+    let scene = pool.install(|| prepare::build(scene_args, &brute, loaded, 0))?;
     let options = BenchOptions {
         structures: if args.accel.is_empty() { StructureKind::all() } else { args.accel.clone() },
         threads: pool.current_num_threads(),

@@ -11,7 +11,7 @@ use crate::scene::{IntegratorKind, Scene};
 
 /// Loads and builds the scene, and prints what it finds.
 pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
-    let kind = args.accel.kind;
+    let accel = &args.accel;
     let args = &args.scene;
     super::progress::catch_interrupts();
     let clock = Instant::now();
@@ -21,7 +21,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
     let clock = Instant::now();
     let film = prepare::film_bytes(&PixelRect::whole(loaded.scene.image.size), false);
     let pool = prepare::thread_pool(args.threads)?;
-    let scene = pool.install(|| prepare::build(args, kind, loaded, film))?;
+    let scene = pool.install(|| prepare::build(args, accel, loaded, film))?;
     let build = clock.elapsed().as_secs_f64();
 
     let info = scene.accel.info();

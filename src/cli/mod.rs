@@ -16,6 +16,7 @@ mod prepare;
 mod progress;
 mod render;
 mod report;
+mod trade;
 mod units;
 mod watch;
 
@@ -91,6 +92,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
         Command::Inspect(args) => inspect::inspect(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Bench(args) => bench::bench(&args),
+        Command::Trade(args) => trade::trade(&args),
         Command::Generate(args) => generate::generate(&args),
     };
     match result {

@@ -1,10 +1,10 @@
 //! What several commands begin with: a scene loaded with the flags that stand for its fields, memory that
 //! suffices, threads, accelerators built.
 
-use super::args::SceneArgs;
+use super::args::{AccelArgs, SceneArgs};
 use super::progress::{Progress, interrupted};
 use super::{Failure, tell, warn};
-use crate::accel::{AccelError, AccelKind, BuildOptions, Compact};
+use crate::accel::{AccelError, BuildOptions, Compact};
 use crate::film::PixelRect;
 use crate::io::{LoadOptions, LoadedScene, available_memory, load_scene};
 use crate::scene::{RenderSettings, Scene, SceneError};
@@ -63,12 +63,13 @@ pub(super) fn check_memory([width, height]: [u32; 2], film: u64) -> Result<(), F
 /// Builds the scene, showing progress; leaves `film` bytes free for the picture.
 pub(super) fn build(
     args: &SceneArgs,
-    kind: AccelKind,
+    accel: &AccelArgs,
     loaded: LoadedScene,
     film: u64,
 ) -> Result<Scene, Failure> {
     let options = BuildOptions {
-        kind,
+        kind: accel.kind,
+        single_rays: accel.single_rays,
         threads: args.threads.map(usize::from),
         memory_limit: args.memory_limit,
         free: available_memory().map(|free| free.saturating_sub(film)),

@@ -1,5 +1,6 @@
 //! Progress: a bar on a terminal, a line now and then elsewhere, nothing when asked to be quiet.
 
+use std::borrow::Cow;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -39,7 +40,7 @@ pub(super) fn interrupted() -> bool {
 /// Shows how one phase of the work goes.
 pub(super) struct Progress {
     display: Display,
-    phase: &'static str,
+    phase: Cow<'static, str>,
     start: Instant,
     /// The error of the picture so far, as bits; NaN where it is not known.
     error: AtomicU64,
@@ -53,7 +54,8 @@ enum Display {
 }
 
 impl Progress {
-    pub(super) fn new(quiet: bool, phase: &'static str) -> Self {
+    pub(super) fn new(quiet: bool, phase: impl Into<Cow<'static, str>>) -> Self {
+        let phase = phase.into();
         let display = if quiet {
             Display::Quiet
         } else if std::io::stderr().is_terminal() {
@@ -61,8 +63,9 @@ impl Progress {
                 "{prefix:>9} [{bar:32}] {percent:>3} %  {elapsed}, {eta} left  {msg}",
             )
             .unwrap_or_else(|_| ProgressStyle::default_bar());
-            let bar =
-                ProgressBar::new(STEPS).with_style(style.progress_chars("=> ")).with_prefix(phase);
+            let bar = ProgressBar::new(STEPS)
+                .with_style(style.progress_chars("=> "))
+                .with_prefix(phase.clone());
             Display::Bar(bar)
         } else {
             Display::Lines(Mutex::new(Instant::now()))

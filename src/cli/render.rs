@@ -51,7 +51,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     check_memory(frame.size, film)?;
     let views = plan.views(frame.size)?;
 
-    let build = || pool.install(|| build(&args.scene, args.accel.kind, loaded, film));
+    let build = || pool.install(|| build(&args.scene, &args.accel, loaded, film));
     let scene = timed(&mut phases.build, build)?;
     let job = plan.job(&frame, start);
     let identity = plan.identity(&scene, hash, &frame);

@@ -84,6 +84,14 @@ pub(super) struct ExrHead {
 /// Names and bits of channels of 32 bits a pixel, row by row.
 pub(super) type WideChannels = Vec<(String, Vec<u32>)>;
 
+/// What the header of an EXR file says beside what every header does, by name.
+///
+/// # Errors
+/// [`ReadError`] where the file cannot be read, is not a sound EXR file, or has several parts.
+pub fn read_attributes(path: &Path) -> Result<Vec<Attribute>, ReadError> {
+    Ok(read_head(path)?.attributes)
+}
+
 /// Reads the header of an EXR file alone.
 ///
 /// # Errors

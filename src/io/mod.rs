@@ -43,7 +43,7 @@ pub use exr::{
     Channel, ChannelValues, ExrCompression, ExrLayout, ExrOptions, PixelType, Row, write_channels,
     write_exr,
 };
-pub use exr_read::read_exr;
+pub use exr_read::{read_attributes, read_exr};
 pub use grid::{SampleLayout, SampleType, read_npy, read_raw};
 pub use image::{ColorSpace, ImageFile, read_image};
 pub use layers::{CRYPTOMATTE_RANKS, film_channels, matte_attributes};
@@ -53,7 +53,7 @@ pub use mesh_write::write_mesh;
 pub use mistakes::{Mistake, Mistakes};
 pub use output::{Attribute, AttributeValue, check_writable, remove_unfinished, write_text};
 pub use picture::{read_picture, read_png};
-pub use png::{ToneMap, write_png};
+pub use png::{ToneMap, png_bytes, write_png};
 pub use radiance::write_hdr;
 pub use scene_file::{LoadError, LoadOptions, LoadedScene, load_scene};
 pub use state::{StateFile, StateHead, StateView, read_state, read_state_head, write_state};

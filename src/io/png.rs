@@ -1,11 +1,12 @@
 //! PNG: 8 bits a channel in sRGB, for looking at. Exposure is applied, then a tone curve.
 
+use std::io::Write;
 use std::path::Path;
 
 use super::error::WriteError;
 use super::output::write_whole;
 use crate::color::{Rgb, srgb_from_linear};
-use crate::film::Film;
+use crate::film::{Film, Picture};
 
 /// How light becomes what a display shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -55,22 +56,39 @@ pub fn write_png(
     exposure: f32,
     tone_map: ToneMap,
 ) -> Result<(), WriteError> {
-    let scale = exposure.exp2();
-    let byte = |x: f32| (srgb_from_linear(tone_map.apply(x * scale)) * 255.0).round() as u8;
-    let bytes: Vec<u8> = film.mean.iter().flat_map(|c: &Rgb| c.to_array().map(byte)).collect();
+    let size = [film.window.width(), film.window.height()];
     write_whole(path, |writer| {
-        let failed = |error: png::EncodingError| match error {
+        encode(writer, size, &film.mean, exposure, tone_map).map_err(|error| match error {
             png::EncodingError::IoError(e) => WriteError::io(path, "write", e),
             other => WriteError::format(path, other.to_string()),
-        };
-        let mut encoder = png::Encoder::new(writer, film.window.width(), film.window.height());
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        let mut encoder = encoder.write_header().map_err(failed)?;
-        encoder.write_image_data(&bytes).map_err(failed)?;
-        encoder.finish().map_err(failed)
+        })
     })
+}
+
+/// A picture as the bytes of an sRGB PNG; none where it is larger than PNG holds.
+pub fn png_bytes(picture: &Picture) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let encoded = encode(&mut bytes, picture.extent, &picture.pixels, 0.0, ToneMap::Srgb);
+    if encoded.is_ok() { bytes } else { Vec::new() }
+}
+
+fn encode(
+    writer: impl Write,
+    [width, height]: [u32; 2],
+    pixels: &[Rgb],
+    exposure: f32,
+    tone_map: ToneMap,
+) -> Result<(), png::EncodingError> {
+    let scale = exposure.exp2();
+    let byte = |x: f32| (srgb_from_linear(tone_map.apply(x * scale)) * 255.0).round() as u8;
+    let bytes: Vec<u8> = pixels.iter().flat_map(|c| c.to_array().map(byte)).collect();
+    let mut encoder = png::Encoder::new(writer, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    let mut encoder = encoder.write_header()?;
+    encoder.write_image_data(&bytes)?;
+    encoder.finish()
 }
 
 #[cfg(test)]

@@ -1,9 +1,12 @@
 //! How far a picture is from a reference: error metrics over pixels, and FLIP (`flip.rs`). Sums are in
 //! f64. This part knows pictures, not files, and not how they were made. And how fast and how right
-//! accelerators are on a scene's own rays ([`mod@bench`]).
+//! accelerators are on a scene's own rays ([`mod@bench`]), and what speed costs in accuracy
+//! ([`mod@trade`]).
 
 pub mod bench;
 mod flip;
+mod html;
+pub mod trade;
 
 use rayon::prelude::*;
 

@@ -36,6 +36,7 @@ pub struct BvhAccel {
     copies: Vec<Copy>,
     isa: Isa,
     is_robust: bool,
+    single_rays: bool,
 }
 
 impl BvhAccel {
@@ -95,7 +96,8 @@ impl BvhAccel {
             prototypes,
             copies: copies.into_iter().map(|(copy, _)| copy).collect(),
             isa: Isa::detect(),
-            is_robust: options.precision == Precision::Robust,
+            is_robust: options.precision != Precision::Fast,
+            single_rays: options.single_rays,
         })
     }
 
@@ -105,7 +107,7 @@ impl BvhAccel {
         AccelInfo {
             name: "BVH".into(),
             isa: self.isa.name(),
-            packet_width: LANES,
+            packet_width: if self.single_rays { 1 } else { LANES },
             bytes: trees.sum::<u64>() + (self.copies.len() * size_of::<Copy>()) as u64,
         }
     }
@@ -142,6 +144,10 @@ impl BvhAccel {
 
     #[inline(always)]
     fn any_of_block<const OPAQUE: bool>(&self, rays: &RayBlock) -> u16 {
+        if self.single_rays {
+            let is_hit = |lane: &usize| self.any::<OPAQUE>(&rays.get(*lane));
+            return rays.lanes().filter(is_hit).fold(0, |bits, lane| bits | 1 << lane);
+        }
         if self.is_robust {
             self.isa.run(AnyOfBlock::<true, OPAQUE> { accel: self, rays })
         } else {
@@ -173,6 +179,9 @@ impl RayQuery for BvhAccel {
 
     #[inline]
     fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
+        if self.single_rays {
+            return HitBlock::from_fn(rays.active(), |lane| self.intersect(&rays.get(lane)));
+        }
         if self.is_robust {
             self.isa.run(ClosestOfBlock::<true> { accel: self, rays })
         } else {

@@ -3,14 +3,7 @@
 use std::fmt::Write;
 
 use super::{BenchReport, Compared, RayKind, Row};
-
-const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;color:#1b1f24;background:#fff;max-width:62rem;\
-margin:2rem auto;padding:0 1rem}h1{font-size:1.5rem;margin-bottom:.2rem}h2{font-size:1.1rem;margin-top:2.2rem}\
-p{color:#4a525a}table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}\
-th,td{padding:.25rem .6rem;text-align:right;border-bottom:1px solid #e3e6e9}th{font-weight:600;color:#4a525a}\
-th:first-child,td:first-child{text-align:left}.wrong{color:#b3261e;font-weight:600}.none{color:#8a929a}\
-svg{display:block;width:100%;height:auto;margin:.4rem 0 1rem}svg text{font:12px system-ui,sans-serif;fill:#1b1f24}\
-svg .faint{fill:#6a727a}figure{margin:0}figcaption{font-weight:600}";
+use crate::measure::html::{escaped, page};
 
 /// Colours of the bars: one thread, all threads.
 const COLOURS: [&str; 2] = ["#8fb3d9", "#2f6cad"];
@@ -64,12 +57,7 @@ pub fn html(scene: &str, report: &BenchReport) -> String {
             let _ = writeln!(body, "<p>{}: {}</p>", escaped(&row.name), escaped(reason));
         }
     }
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>alhazen bench: {}</title>\n\
-         <meta name=\"viewport\" content=\"width=device-width\">\n<style>{STYLE}</style></head>\n\
-         <body>\n{body}</body></html>\n",
-        escaped(scene)
-    )
+    page(&format!("alhazen bench: {scene}"), &body)
 }
 
 /// Numbers of threads that were measured.
@@ -185,18 +173,9 @@ fn short(x: f64) -> String {
     }
 }
 
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_cannot_break_the_page() {
-        assert_eq!(escaped("a<b>&\"c\""), "a&lt;b&gt;&amp;&quot;c&quot;");
-    }
 
     #[test]
     fn bars_are_as_long_as_what_they_stand_for() {
