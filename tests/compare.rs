@@ -304,3 +304,34 @@ fn what_is_written_is_read_back() {
     }
     assert_eq!(Picture::from(picture.clone()).origin, Some([7, 9]));
 }
+
+/// Layers are compared channel by channel, halves and floats; what only one has is named.
+#[test]
+fn channels_are_compared_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scene = "[image]\nsize = [16, 12]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n\
+                 [[objects]]\nshape = \"disk\"\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\nradius = 50\n";
+    std::fs::write(folder.join("s.toml"), scene).unwrap();
+    for (name, more) in [("a.exr", "camera.eye=[0,0,5]"), ("b.exr", "camera.eye=[0,0,5.5]")] {
+        let all = ["render", "s.toml", "-q", "-o", name, "--layers", "depth,normal", "--set", more];
+        assert!(alhazen(folder, &all).status.success());
+    }
+    let report = json(folder, &["a.exr", "b.exr", "--channels"]);
+    let channels = report["channels"].as_array().unwrap();
+    let by_name = |name: &str| channels.iter().find(|c| c["name"] == name).unwrap();
+    // Half a metre farther, and seen the same way.
+    assert!((by_name("Z")["mae"].as_f64().unwrap() - 0.5).abs() < 1e-5, "{channels:?}");
+    assert_eq!(by_name("normal.Z")["max"], 0.0);
+    assert_eq!(channels.len(), 7);
+    let (code, out, _) = compare(folder, &["a.exr", "b.exr", "--channels"]);
+    assert!(code == 0 && out.contains("normal.Z") && out.contains("relmse"), "{out}");
+
+    let all = ["render", "s.toml", "-q", "-o", "c.exr", "--layers", "normal"];
+    assert!(alhazen(folder, &all).status.success());
+    let (code, _, error) = compare(folder, &["a.exr", "c.exr", "--channels"]);
+    assert!(code == 2 && error.contains("c.exr lacks Z"), "{error}");
+    // Colours alone are the same question as ever.
+    assert_eq!(compare(folder, &["a.exr", "c.exr"]).0, 0);
+    assert!(json(folder, &["a.exr", "b.exr"])["channels"].is_null());
+}

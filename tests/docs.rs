@@ -30,8 +30,9 @@ const REFERENCE: [(&str, &str); 6] = [
 ];
 
 /// Pages with scenes and links beside the reference.
-const OTHERS: [(&str, &str); 5] = [
+const OTHERS: [(&str, &str); 6] = [
     ("docs/output.md", include_str!("../docs/output.md")),
+    ("docs/numerics.md", include_str!("../docs/numerics.md")),
     ("docs/trade.md", include_str!("../docs/trade.md")),
     ("docs/bench.md", include_str!("../docs/bench.md")),
     ("README.md", include_str!("../README.md")),

@@ -241,6 +241,34 @@ fn an_interrupted_render_says_how_to_go_on() {
     }
 }
 
+/// The file of a part is whole or not there, so that a job that is requeued can go by it.
+#[test]
+fn an_interrupted_part_leaves_a_checkpoint_alone() {
+    let folder = folder();
+    let folder = folder.path();
+    render(folder, "-q -o whole.exr --part 1/2 --samples 1800");
+    for arguments in ["", " --checkpoint 0.05s"] {
+        let mut child =
+            start(folder, &format!("-q -o out.exr --part 1/2 --samples 1800{arguments}"));
+        std::thread::sleep(Duration::from_millis(400));
+        let status = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+        assert!(status.unwrap().success());
+        let code = child.wait().unwrap().code();
+        if code == Some(0) {
+            // It had been faster.
+            std::fs::remove_file(folder.join("out.exr")).unwrap();
+            continue;
+        }
+        assert_eq!(code, Some(130));
+        assert!(!folder.join("out.exr").exists());
+        assert!(folder.join("out.checkpoint.exr").exists());
+        render(folder, "-q -o out.exr --part 1/2 --samples 1800 --resume");
+        same(folder, "whole.exr", "out.exr");
+        assert!(!folder.join("out.checkpoint.exr").exists());
+        std::fs::remove_file(folder.join("out.exr")).unwrap();
+    }
+}
+
 #[test]
 fn more_samples_go_on_from_fewer() {
     let folder = folder();

@@ -315,6 +315,10 @@ pub(super) struct CompareArgs {
     #[arg(long)]
     pub(super) hdr_flip: bool,
 
+    /// Also every channel of two EXR files by itself, layers included; channels that only one has are an error
+    #[arg(long)]
+    pub(super) channels: bool,
+
     /// Write a picture of the difference: .png shows FLIP from black to yellow (cyan: not finite), .exr
     /// holds absolute differences
     #[arg(long, value_name = "FILE")]

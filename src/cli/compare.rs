@@ -9,11 +9,12 @@ use super::units::grouped;
 use super::{Failure, Outcome, print};
 use crate::film::{Film, Layers, Picture, PixelRect};
 use crate::io::{
-    ExrOptions, PixelType, ToneMap, WriteError, check_writable, read_picture, write_exr, write_png,
-    write_text,
+    ExrOptions, PictureChannels, PixelType, ToneMap, WriteError, check_writable, read_picture,
+    read_picture_channels, write_exr, write_png, write_text,
 };
 use crate::measure::{
-    CompareOptions, Comparison, absolute_difference, check_same_pixels, compare as measure, magma,
+    CompareOptions, Comparison, absolute_difference, check_same_pixels, compare as measure,
+    compare_channel, magma,
 };
 
 /// The fields of `--json`; their names are stable. A number that is infinite or undefined is null.
@@ -35,8 +36,22 @@ struct Report<'a> {
     /// First and last, in stops.
     hdr_flip_exposures: Option<[f32; 2]>,
     non_finite: u64,
+    /// Where they were asked for.
+    channels: Option<Vec<Channel>>,
     /// Whether no limit was exceeded.
     passed: bool,
+}
+
+/// A channel by itself.
+#[derive(Debug, Clone, Serialize)]
+struct Channel {
+    name: String,
+    mse: f64,
+    mae: f64,
+    relmse: f64,
+    max: f64,
+    max_at: [u32; 2],
+    non_finite: u64,
 }
 
 /// A picture of the difference.
@@ -62,6 +77,7 @@ pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
         hdr_flip: args.hdr_flip || args.max_hdr_flip.is_some(),
         ..CompareOptions::default()
     };
+    let channels = args.channels.then(|| channels(args)).transpose()?;
     let found = measure(&a, &b, &options).map_err(unequal)?;
     let exceeded = exceeded(args, &found);
 
@@ -80,15 +96,74 @@ pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
         None => {}
     }
     if let Some(path) = &args.json {
-        write_json(path, args, &found, exceeded.is_empty())?;
+        write_json(path, args, &found, channels.clone(), exceeded.is_empty())?;
     }
     if !args.quiet {
         print_table(args, &found);
+        print_channels(channels.as_deref().unwrap_or_default());
         for path in args.difference.iter().chain(&args.json) {
             print(&format!("{:>10}  {}", "wrote", path.display()));
         }
     }
     if exceeded.is_empty() { Ok(Outcome::Done) } else { Err(Failure::Failed(exceeded.join("\n"))) }
+}
+
+/// Every channel of both files.
+fn channels(args: &CompareArgs) -> Result<Vec<Channel>, Failure> {
+    let read =
+        |path: &Path| read_picture_channels(path).map_err(|e| Failure::BadInput(e.to_string()));
+    let (a, b) = (read(&args.picture)?, read(&args.reference)?);
+    // Their pixels are the same: that was looked at before.
+    let lacking = |of: &PictureChannels, other: &PictureChannels, path: &Path| {
+        let has = |name: &str| of.channels.iter().any(|(n, _)| n == name);
+        let names = other.channels.iter().map(|(name, _)| name).filter(|name| !has(name));
+        let names: Vec<&str> = names.map(String::as_str).collect();
+        (!names.is_empty()).then(|| format!("{} lacks {}", path.display(), names.join(", ")))
+    };
+    let lacks: Vec<String> = [lacking(&a, &b, &args.picture), lacking(&b, &a, &args.reference)]
+        .into_iter()
+        .flatten()
+        .collect();
+    if !lacks.is_empty() {
+        let message =
+            format!("--channels: {}; accepted: files of the same channels", lacks.join("; "));
+        return Err(Failure::BadInput(message));
+    }
+    let channel = |(name, values): &(String, Vec<f32>)| {
+        let (_, other) = b.channels.iter().find(|(n, _)| n == name)?;
+        let found = compare_channel(values, other, a.extent[0]);
+        Some(Channel {
+            name: name.clone(),
+            mse: found.mse,
+            mae: found.mae,
+            relmse: found.rel_mse,
+            max: found.largest,
+            max_at: found.largest_at,
+            non_finite: found.non_finite,
+        })
+    };
+    Ok(a.channels.iter().filter_map(channel).collect())
+}
+
+fn print_channels(channels: &[Channel]) {
+    if channels.is_empty() {
+        return;
+    }
+    print(&format!(
+        "\n{:>22}{:>14}{:>14}{:>14}{:>14}{:>12}",
+        "channel", "mse", "mae", "relmse", "max", "non-finite"
+    ));
+    for c in channels {
+        print(&format!(
+            "{:>22}{:>14}{:>14}{:>14}{:>14}{:>12}",
+            c.name,
+            digits(c.mse),
+            digits(c.mae),
+            digits(c.relmse),
+            digits(c.max),
+            c.non_finite
+        ));
+    }
 }
 
 fn kind(path: &Path) -> Result<Difference<'_>, Failure> {
@@ -195,6 +270,7 @@ fn write_json(
     path: &Path,
     args: &CompareArgs,
     found: &Comparison,
+    channels: Option<Vec<Channel>>,
     passed: bool,
 ) -> Result<(), Failure> {
     let report = Report {
@@ -211,6 +287,7 @@ fn write_json(
         hdr_flip: found.hdr_flip.map(|(mean, _)| mean),
         hdr_flip_exposures: found.hdr_flip.map(|(_, e)| [e.first, e.last]),
         non_finite: found.non_finite,
+        channels,
         passed,
     };
     let text = serde_json::to_string_pretty(&report)

@@ -99,12 +99,6 @@ impl Keeper {
         }
     }
 
-    /// Keeps the end of a render that is not finished.
-    pub(super) fn keep_end(&self, rendered: &Rendered) -> Result<(), WriteError> {
-        let Some(state) = &rendered.state else { return Ok(()) };
-        write_end(&self.path, rendered, state, self.identity.clone())
-    }
-
     /// The state that the file holds, where there is one, of the same render.
     pub(super) fn read(
         &self,

@@ -2,7 +2,7 @@
 //! build, render, write.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -86,7 +86,8 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         report::print_table(&phases, &rendered, &accel);
     }
     if rendered.stop == Stop::Interrupted {
-        tell("interrupted; the picture holds what was finished, the rest is black");
+        let what = if plan.args.part.is_some() { "checkpoint" } else { "picture" };
+        tell(&format!("interrupted; the {what} holds what was finished, the rest is black"));
         return Ok(Outcome::Interrupted);
     }
     Ok(Outcome::Done)
@@ -204,14 +205,23 @@ impl<'a> Plan<'a> {
         watch.views.iter().for_each(|(_, view)| view.show(&rendered.film));
         let keeper = watch.keeper.as_ref().map(|(_, keeper)| keeper);
         let is_interrupted = rendered.stop == Stop::Interrupted;
-        if let Some(keeper) = keeper.filter(|_| is_interrupted) {
+        let quiet = self.args.scene.quiet;
+        let kept = rendered.state.as_ref().filter(|_| keeper.is_some() || frame.part.is_some());
+        if let Some(state) = kept.filter(|_| is_interrupted) {
+            let path = checkpoint_path(&self.outputs[0].path);
+            let write = |path: &Path| write_end(path, rendered, state, attributes.clone());
+            if frame.part.is_some() {
+                // The file of a part is whole, or not there: who waits for parts goes by that.
+                write_or_rescue(&path, quiet, write)?;
+                tell(&format!("to go on: {}", resuming_command()));
+                return Ok(());
+            }
             // The picture is written all the same.
-            match keeper.keep_end(rendered) {
+            match write(&path) {
                 Ok(()) => tell(&format!("to go on: {}", resuming_command())),
                 Err(error) => warn(&format!("no checkpoint: {error}")),
             }
         }
-        let quiet = self.args.scene.quiet;
         match (&frame.part, &rendered.state) {
             (Some(_), Some(state)) => write_or_rescue(&self.outputs[0].path, quiet, |path| {
                 write_end(path, rendered, state, attributes.clone())

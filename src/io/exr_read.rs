@@ -69,6 +69,41 @@ fn decode_layer(path: &Path, bytes: &[u8]) -> Result<Picture, ReadError> {
     Ok(Picture { size, extent, origin: Some(origin), pixels })
 }
 
+/// All channels of the only part of an EXR file, by name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PictureChannels {
+    /// The pixels that it holds, across and down.
+    pub extent: [u32; 2],
+    /// Where the first of them lies in the whole.
+    pub origin: [i32; 2],
+    /// Names and values, row by row from the top; whole numbers as the nearest float.
+    pub channels: Vec<(String, Vec<f32>)>,
+}
+
+/// Reads all channels of an EXR file: half, float and whole numbers.
+///
+/// # Errors
+/// [`ReadError`] where the file cannot be read, is not a sound EXR file, or has several parts.
+pub fn read_picture_channels(path: &Path) -> Result<PictureChannels, ReadError> {
+    with_only_part(path, |parts| {
+        let (head, count) = head(parts)?;
+        let list = &parts.meta.headers[0].channels.list;
+        let mut channels = Vec::new();
+        for channel in list {
+            channels.push((channel.name.to_string(), reserve(path, count, 0.0f32)?));
+        }
+        let all: Vec<usize> = (0..list.len()).collect();
+        parts.decode(0, &all, |first, k, kind, values| {
+            let size = kind.bytes_per_sample();
+            let row = &mut channels[k].1[first..first + values.len() / size];
+            for (to, value) in row.iter_mut().zip(values.chunks_exact(size)) {
+                *to = sample(kind, value);
+            }
+        })?;
+        Ok(PictureChannels { extent: head.extent, origin: head.origin, channels })
+    })
+}
+
 /// What the header of the only part of a file says.
 pub(super) struct ExrHead {
     /// Size of the whole picture.

@@ -43,7 +43,7 @@ pub use exr::{
     Channel, ChannelValues, ExrCompression, ExrLayout, ExrOptions, PixelType, Row, write_channels,
     write_exr,
 };
-pub use exr_read::{read_attributes, read_exr};
+pub use exr_read::{PictureChannels, read_attributes, read_exr, read_picture_channels};
 pub use grid::{SampleLayout, SampleType, read_npy, read_raw};
 pub use image::{ColorSpace, ImageFile, read_image};
 pub use layers::{CRYPTOMATTE_RANKS, film_channels, matte_attributes};

@@ -4,12 +4,14 @@
 //! ([`mod@trade`]).
 
 pub mod bench;
+mod channel;
 mod flip;
 mod html;
 pub mod trade;
 
 use rayon::prelude::*;
 
+pub use channel::{ChannelComparison, compare_channel};
 pub use flip::{Exposures, PIXELS_PER_DEGREE, flip, hdr_flip};
 
 use crate::color::{Rgb, linear_from_srgb};
