@@ -270,10 +270,16 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
 
         let is_all = samples == (0..1) && !is_kept && self.layers.are_none();
         let taken = samples.len() as u64;
+        // What is discarded does not count: a render that goes on counts as one without a pause.
+        let (counted, found) =
+            (output.rays, [output.non_finite.count, output.non_finite.first.len() as u64]);
         let pixels: [PixelSampler; LANES] =
             std::array::from_fn(|lane| PixelSampler::new(self.seed, pixel(lane)));
         for sample in samples {
             if sample % STOP_EVERY == 0 && observer.stop() {
+                output.rays = counted;
+                output.non_finite.count = found[0];
+                output.non_finite.first.truncate(found[1] as usize);
                 return false;
             }
             let samplers = pixels.map(|pixel| pixel.sample(sample));
