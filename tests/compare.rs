@@ -202,7 +202,7 @@ fn bad_input_is_exit_code_2() {
         ),
         (
             &["ref.exr", "test.exr", "--difference", "./test.exr"],
-            "./test.exr: would be written twice, or over what is compared",
+            "./test.exr: would be written twice, or over an input",
         ),
         (&["ref.exr", "test.exr", "--json", "no/where"], "no/where: cannot create a file"),
     ];

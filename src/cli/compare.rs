@@ -5,11 +5,12 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::CompareArgs;
+use super::outputs::check_targets;
 use super::units::grouped;
 use super::{Failure, Outcome, print};
 use crate::film::{Film, Layers, Picture, PixelRect};
 use crate::io::{
-    ExrOptions, PictureChannels, PixelType, ToneMap, WriteError, check_writable, read_picture,
+    ExrOptions, PictureChannels, PixelType, ToneMap, WriteError, read_picture,
     read_picture_channels, write_exr, write_png, write_text,
 };
 use crate::measure::{
@@ -65,7 +66,8 @@ enum Difference<'a> {
 /// Compares, prints, writes what was asked for.
 pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
     let difference = args.difference.as_deref().map(kind).transpose()?;
-    check_targets(args)?;
+    let read = [args.picture.as_path(), args.reference.as_path()];
+    check_targets(read, args.difference.iter().chain(&args.json))?;
     let read = |path: &Path| read_picture(path).map_err(|e| Failure::BadInput(e.to_string()));
     let (a, b) = (read(&args.picture)?, read(&args.reference)?);
     let unequal = |e| {
@@ -176,28 +178,6 @@ fn kind(path: &Path) -> Result<Difference<'_>, Failure> {
             path.display()
         ))),
     }
-}
-
-/// Finds out before any work that every file could be written, and that none is written twice or over
-/// what is compared.
-fn check_targets(args: &CompareArgs) -> Result<(), Failure> {
-    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let mut taken = vec![real(&args.picture), real(&args.reference)];
-    for path in args.difference.iter().chain(&args.json) {
-        check_writable(path).map_err(|e| Failure::BadInput(e.to_string()))?;
-        // A file that is not there yet is told by its folder.
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let place = path
-            .canonicalize()
-            .unwrap_or_else(|_| real(folder).join(path.file_name().unwrap_or_default()));
-        if taken.contains(&place) {
-            let path = path.display();
-            let message = format!("{path}: would be written twice, or over what is compared");
-            return Err(Failure::BadInput(message));
-        }
-        taken.push(place);
-    }
-    Ok(())
 }
 
 /// A line for each limit that the pictures exceed. A metric that is undefined exceeds any.

@@ -2,8 +2,8 @@
 
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;color:#1b1f24;background:#fff;max-width:64rem;\
 margin:2rem auto;padding:0 1rem}h1{font-size:1.5rem;margin-bottom:.2rem}h2{font-size:1.1rem;margin-top:2.2rem}\
-p{color:#4a525a}table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}\
-th,td{padding:.25rem .6rem;text-align:right;border-bottom:1px solid #e3e6e9}th{font-weight:600;color:#4a525a}\
+p{color:#4a525a}table{border-collapse:collapse;width:100%;font-size:.86em;font-variant-numeric:tabular-nums}\
+th,td{padding:.25rem .45rem;text-align:right;border-bottom:1px solid #e3e6e9}th{font-weight:600;color:#4a525a}\
 th:first-child,td:first-child{text-align:left}.wrong{color:#b3261e;font-weight:600}.none{color:#8a929a}\
 svg{display:block;width:100%;height:auto;margin:.4rem 0 1rem}svg text{font:12px system-ui,sans-serif;fill:#1b1f24}\
 svg .faint{fill:#6a727a}figure{margin:0}figcaption{font-weight:600}\

@@ -340,8 +340,18 @@ pub fn trade(
 
 impl Trade<'_> {
     fn render(&self, built: &Built) -> Result<Measured, TradeError> {
+        self.render_until(built, None)
+    }
+
+    fn render_until(
+        &self,
+        built: &Built,
+        deadline: Option<Instant>,
+    ) -> Result<Measured, TradeError> {
         let start = Instant::now();
-        let rendered = render(&built.scene, &built.job(), self.observer);
+        let mut job = built.job();
+        job.stop = job.stop.map(|rules| StopRules { deadline, ..rules });
+        let rendered = render(&built.scene, &job, self.observer);
         if rendered.stop == Stop::Interrupted {
             return Err(TradeError::Interrupted);
         }

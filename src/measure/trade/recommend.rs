@@ -1,11 +1,11 @@
 //! Settings that reach an error or keep to a time: put together from what each knob was measured to do,
 //! then rendered and measured themselves.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::{Choice, Point, Trade, TradeError, TradeReport, build, reference_choice};
+use super::{Choice, Measured, Point, Trade, TradeError, TradeReport, build, reference_choice};
 
 /// What settings are to reach.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -136,7 +136,8 @@ pub(super) fn recommend(
     let mut search = Search {
         target,
         power: model.power,
-        samples: first.unwrap_or(1.0).max(1.0),
+        // Not far beyond what was measured: the model is of small renders, whose times scatter.
+        samples: first.unwrap_or(1.0).clamp(1.0, 8.0 * most_measured(report)),
         too_few: 0.0,
         enough: f64::INFINITY,
     };
@@ -153,7 +154,10 @@ pub(super) fn recommend(
         } else {
             choice.settings.samples = samples.ceil() as u32;
         }
-        let (found, is_biased) = attempt(trade, &choice, &base.choice, target, tries)?;
+        let (found, is_biased, taken) = attempt(trade, &choice, &base.choice, target, tries)?;
+        if matches!(target, Target::Time(_)) {
+            search.samples = f64::from(taken);
+        }
         let (error, seconds, is_reached) = (found.error, found.seconds, found.is_reached);
         let is_better = best.as_ref().is_none_or(|best| match target {
             _ if best.is_reached != is_reached => is_reached,
@@ -222,10 +226,15 @@ fn attempt(
     base: &Choice,
     target: Target,
     tries: u32,
-) -> Result<(Recommendation, bool), TradeError> {
+) -> Result<(Recommendation, bool, u32), TradeError> {
     let start = Instant::now();
     let built = build(trade.desc, choice)?;
-    let film = trade.render(&built)?.film;
+    // What takes longer than it may need not be waited for.
+    let deadline = match target {
+        Target::Time(most) => Some(start + Duration::from_secs_f64(1.5 * most)),
+        Target::Error(_) => None,
+    };
+    let Measured { film, samples, .. } = trade.render_until(&built, deadline)?;
     let seconds = start.elapsed().as_secs_f64() + trade.options.read_and_write;
     let reference = trade.reference;
     let squared = (film.error_against(&reference.film).powi(2) - reference.error.powi(2)).max(0.0);
@@ -235,10 +244,16 @@ fn attempt(
             let noise = film.sampling_error().map_or(squared, |stated| stated.high.powi(2));
             (error <= most, squared - noise > 0.3 * most * most)
         }
-        Target::Time(most) => (seconds <= most, false),
+        Target::Time(most) => (seconds <= most && samples >= choice.settings.samples, false),
     };
     let flags = choice.flags(base);
-    Ok((Recommendation { target, flags, error, seconds, is_reached, tries }, is_biased))
+    Ok((Recommendation { target, flags, error, seconds, is_reached, tries }, is_biased, samples))
+}
+
+/// The most samples that anything was measured with.
+fn most_measured(report: &TradeReport) -> f64 {
+    let points = report.convergence.iter().chain([&report.base]);
+    f64::from(points.map(|point| point.samples).max().unwrap_or(1))
 }
 
 /// Whether the same error was reached in less time with samples where the error is.
