@@ -10,7 +10,14 @@ use alhazen::render::{RenderJob, StopRules, render};
 use alhazen::scene::Scene;
 
 mod common;
-use common::{Random, alhazen, stderr, verify};
+#[allow(dead_code, reason = "what benchmarks tell other renderers")]
+#[path = "../benches/common/w2.rs"]
+mod w2;
+
+use common::{alhazen, stderr, verify};
+
+/// The size that the benchmark has.
+const SIZE: [u32; 2] = [1280, 720];
 
 /// Makes a scene, with what files it takes in a folder.
 type Make = fn(&Path) -> Scene;
@@ -31,55 +38,9 @@ fn showcase(_: &Path) -> Scene {
     load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/showcase.toml"), &[])
 }
 
-/// Mirrors, glass and diffuse spheres over a checkered plane.
-fn spheres(folder: &Path) -> Scene {
-    let mut text = String::from(
-        r#"
-[camera]
-eye = [0, 4.2, 9.5]
-target = [0, 0.7, 0.6]
-fov = 42
-[render]
-max_depth = 8
-[[lights]]
-type = "point"
-position = [-6, 9, 6]
-intensity = 220
-[[lights]]
-type = "point"
-position = [7, 7, 4]
-intensity = [110, 100, 80]
-[materials.floor]
-type = "diffuse"
-reflectance = { checker = [[0.75, 0.75, 0.75], [0.12, 0.12, 0.12]], scale = 1.0 }
-[materials.kind0]
-type = "mirror"
-[materials.kind1]
-type = "dielectric"
-ior = 1.5
-[materials.kind2]
-type = "diffuse"
-reflectance = [0.7, 0.2, 0.15]
-[[objects]]
-shape = "plane"
-point = [0, 0, 0]
-normal = [0, 1, 0]
-material = "floor"
-"#,
-    );
-    let mut random = Random(5);
-    for i in 0..400 {
-        let (x, z) = (random.unit() * 16.0 - 8.0, random.unit() * 16.0 - 10.0);
-        let radius = 0.08 + 0.2 * random.unit();
-        text += &format!(
-            "[[objects]]\nshape = \"sphere\"\ncenter = [{x}, {radius}, {z}]\nradius = {radius}\n\
-             material = \"kind{}\"\n",
-            i % 3
-        );
-    }
-    let path = folder.join("spheres.toml");
-    std::fs::write(&path, text).unwrap();
-    load(&path, &[])
+/// Two thousand spheres of mirror, glass and colours over a checkered floor.
+fn spheres(_: &Path) -> Scene {
+    w2::scene(|desc| desc.image.size = size())
 }
 
 fn soft_shadows(folder: &Path) -> Scene {
