@@ -15,7 +15,8 @@ use alhazen::color::Rgb;
 use alhazen::film::Filter;
 use alhazen::geometry::TriangleMesh;
 use alhazen::light::Falloff;
-use alhazen::material::Material;
+use alhazen::material::fresnel::refract;
+use alhazen::material::{Dielectric, FresnelModel, Ior, Material};
 use alhazen::math::{Bounds, Ray};
 use alhazen::measure::bench::agreement;
 use alhazen::render::{RenderJob, render};
@@ -130,14 +131,16 @@ fn row(case: impl Into<String>, cell: impl Fn(Rung) -> Cell) -> Row {
 
 /// All tables, from `n` rays a case.
 pub fn tables(n: usize) -> Vec<Table> {
-    let all: [&dyn Fn() -> Table; 9] = [
+    let all: [&dyn Fn() -> Table; 11] = [
         &|| leaks(n),
+        &|| double_hits(n),
         &|| far_cameras(n),
         &|| grazing(n),
         &|| self_hits(n),
         &|| stacked(n),
         &|| slivers(n),
         &|| planet(n),
+        &|| refraction(n),
         &moved_pictures,
         &odd_scenes,
     ];
@@ -224,6 +227,55 @@ fn leaks(n: usize) -> Table {
         what: "A closed ball of 102,000 triangles in f32 coordinates, rays from within aimed at vertices / edges / \
                faces: how many of a million escape. Red: any at edges or faces from `robust` on, any at vertices at \
                `exact`.",
+        columns: Rung::columns(),
+        rows: rows.into(),
+    }
+}
+
+/// What leaves a closed, convex mesh through an edge or a vertex meets none of its triangles again.
+fn double_hits(n: usize) -> Table {
+    let rows = [(0.0, 1.0), (0.0, 1e-6), (0.0, 1e6), (1e3, 1.0), (2e4, 10.0)].map(
+        |(offset, scale): (f64, f64)| {
+            let center = DVec3::new(offset, -offset, 0.5 * offset);
+            let mesh = ball(60, DVec3::ZERO, scale);
+            row(format!("offset {}, scale {}", power(offset), power(scale)), |rung| {
+                let mut desc = empty();
+                desc.meshes.push(mesh.clone());
+                let object = ObjectDesc::new(ShapeDesc::Mesh(0), Some("grey"));
+                let transform = DAffine3::from_translation(center);
+                desc.objects.push(ObjectDesc { transform, ..object });
+                if offset != 0.0 {
+                    // Keeps the world from being recentred on the ball.
+                    desc.objects.push(sphere(DVec3::ZERO, 1e-3 * scale));
+                }
+                let scene = rung.scene(desc);
+                let query = scene.accel.query();
+                let center = center - scene.center;
+                let mut random = Random(7);
+                let twice = [1, 2].map(|corners| {
+                    let again = (0..n / 4).filter(|_| {
+                        let c = mesh.corners(random.below(mesh.triangles.len()));
+                        let u = random.unit() as f32;
+                        let target = if corners == 1 { c[0] } else { c[0].lerp(c[1], u) };
+                        let target = target.as_dvec3() + center;
+                        let origin = center + random.in_cube() * 0.3 * scale;
+                        let direction = (target - origin).normalize().as_vec3();
+                        let ray = Ray::new(origin.as_vec3(), direction);
+                        let Some(hit) = query.intersect(&ray) else { return false };
+                        let point = scene.surface(&ray, &hit);
+                        query.intersect(&scene.spawn(&point, direction, f32::INFINITY)).is_some()
+                    });
+                    again.count()
+                });
+                let is_red = rung.is_robust() && twice != [0, 0];
+                Cell::new(twice.map(|x| per_million(x, n / 4)).join(" / "), is_red)
+            })
+        },
+    );
+    Table {
+        title: "Rays that hit twice",
+        what: "A ball of 14,000 triangles, rays from within aimed at vertices / edges, that go straight on from where they hit: \
+               how many of a million hit another triangle, or the same once more. Red: any from `robust` on.",
         columns: Rung::columns(),
         rows: rows.into(),
     }
@@ -631,6 +683,84 @@ fn planet(n: usize) -> Table {
     }
 }
 
+/// Snell's law where it hardly turns light, and where it ceases to let any pass.
+fn refraction(n: usize) -> Table {
+    let mut rows = Vec::new();
+    let mut add = |case: String, text: String, is_red| {
+        rows.push(Row { case, cells: vec![Cell::new(text, is_red)] });
+    };
+    for (name, step) in [("one ulp below", -1), ("at", 0), ("one ulp above", 1)] {
+        let (mut cases, mut wrong) = (0, 0);
+        for i in 0..n as u32 / 64 {
+            let eta = 0.05 + 0.9 * (i as f32 + 0.5) / (n as f32 / 64.0);
+            let sine = f32::from_bits(eta.to_bits().wrapping_add_signed(step));
+            let cosine = (1.0 - f64::from(sine).powi(2)).sqrt() as f32;
+            let passes = refract(Vec3::new(sine, -cosine, 0.0), Vec3::Y, eta).is_some();
+            // eta²·|d|² − sine², in whole numbers: multiples of 2⁻³⁰ all three, but for digits of `sine` and
+            // `eta` below 0.06 that are not.
+            let [s, c, e] = [sine, cosine, eta].map(|x| f64::from(x) * 2f64.powi(30));
+            if [s, c, e].iter().any(|x| x.fract() != 0.0) {
+                continue;
+            }
+            let [s, c, e] = [s, c, e].map(|x| x as i128);
+            let exact = e * e * (s * s + c * c) - ((s * s) << 60);
+            // Nearer to zero than f64 tells apart, either answer is right.
+            if exact.unsigned_abs() > 1 << (120 - 49) {
+                cases += 1;
+                wrong += usize::from(passes != (exact > 0));
+            }
+        }
+        let text = format!("{wrong} of {cases} decided wrongly");
+        add(format!("critical angle, {name}"), text, wrong > 0 || cases < n / 200);
+    }
+    for eta in [1.0, 1.0 + 1e-6f32, 1.0 - 1e-6, 1f32.next_up(), 1f32.next_down()] {
+        let mut random = Random(12);
+        let (mut turned, mut off) = (0.0f64, 0.0f64);
+        for _ in 0..n / 16 {
+            let normal = random.direction().as_vec3();
+            let mut d = random.direction();
+            if random.unit() < 0.25 {
+                d -= normal.as_dvec3() * d.dot(normal.as_dvec3()) * random.between(0.99, 1.0);
+            }
+            let d = d.normalize().as_vec3();
+            let (i, m, e) =
+                (d.as_dvec3().normalize(), normal.as_dvec3().normalize(), f64::from(eta));
+            let cos_i = i.dot(m);
+            let tangent = (i - m * cos_i) / e;
+            let sine = tangent.length();
+            // Total reflection begins 1e-3 off grazing at most.
+            if sine > 1.0 - 1e-5 {
+                continue;
+            }
+            let cos_t = ((1.0 - sine) * (1.0 + sine)).sqrt();
+            let Some(found) = refract(d, normal, eta) else {
+                turned = f64::INFINITY;
+                continue;
+            };
+            let truth = tangent + m * cos_t.copysign(cos_i);
+            turned = turned.max((found.direction.as_dvec3() - truth).length());
+            let cos_i = cos_i.abs();
+            // Fresnel's equations by sines of sums, as tan and sin of θi − θt, which do not cancel.
+            let gap = (cos_t * cos_t - cos_i * cos_i) / (cos_t + cos_i);
+            let s = (cos_i * (1.0 - e) - e * gap) / (cos_i + e * cos_t);
+            let p = (cos_i * (e - 1.0) - gap) / (e * cos_i + cos_t);
+            let reflectance = 0.5 * (s * s + p * p);
+            off = off.max((f64::from(found.reflectance()) - reflectance).abs());
+        }
+        let text = format!("turned by {turned:.0e} rad, reflectance off by {off:.0e}");
+        let is_red = turned > 1e-6 || off > 1e-6;
+        add(format!("index {eta}"), text, is_red);
+    }
+    Table {
+        title: "Refraction",
+        what: "Whether light passes at the sine of the critical angle and its neighbours in f32, over indices from 0.05 to 0.95, \
+               against whole numbers; and with indices near 1, one in four rays nearly grazing, how far a direction and a \
+               reflectance are from Snell's and Fresnel's in f64. Red: a wrong decision, or more than 10⁻⁶.",
+        columns: vec!["found".into()],
+        rows,
+    }
+}
+
 /// Something of each kind, lit and shadowed, `scale` times as large and moved by `offset`.
 fn still_life(scale: f64, offset: DVec3) -> SceneDesc {
     let at = |x: f64, y: f64, z: f64| offset + DVec3::new(x, y, z) * scale;
@@ -857,10 +987,54 @@ fn odd_scenes() -> Table {
         0.5,
         DRAWN,
     );
+    for ior in [1.0, 1.0 + 1e-6, 1.0 - 1e-6] {
+        let through = || {
+            let mut desc = lit(1.0);
+            desc.lights.clear();
+            desc.ambient = Some(Rgb::splat(1.0));
+            let glass = Dielectric {
+                ior: Ior::Constant(ior),
+                absorption: Rgb::BLACK,
+                priority: 0,
+                fresnel: FresnelModel::Exact,
+            };
+            desc.materials.push(MaterialDesc::new("glass", Material::Dielectric(glass)));
+            let ball = sphere(DVec3::new(0.1, 2.0, 0.0), 1.0);
+            desc.objects.push(ObjectDesc { material: Some(Reference::new("glass")), ..ball });
+            desc
+        };
+        add(&format!("seen through a ball of index {ior}"), &through, 0.5, ROUNDED);
+    }
+    let (share, depth) = (0.999f32, 10_000);
+    let mirrors = || {
+        let mut desc = empty();
+        let mirror = Material::Mirror { reflectance: Rgb::splat(share), fresnel: None };
+        let emission = Rgb::splat(0.01);
+        desc.materials.push(MaterialDesc { emission, ..MaterialDesc::new("mirror", mirror) });
+        for (y, normal) in [(0.0, DVec3::Y), (2.0, DVec3::NEG_Y)] {
+            let center = DVec3::new(0.0, y, 0.0);
+            let disk = ShapeDesc::Disk { center, normal, radius: 2.0, inner_radius: 0.0 };
+            desc.objects.push(ObjectDesc::new(disk, Some("mirror")));
+        }
+        desc.camera = Some(look(DVec3::Y, DVec3::ZERO, 1e-6));
+        desc.settings.max_depth = depth;
+        desc.settings.prune = 0.0;
+        desc
+    };
+    let share = f64::from(share);
+    let series = 0.01 * (1.0 - share.powi(depth as i32 + 1)) / (1.0 - share);
+    add("10,000 reflections between two mirrors", &mirrors, series, ROUNDED);
+    let long = || {
+        let mut desc = lit(0.2);
+        desc.image.size = [1, 1];
+        desc.settings.samples = 1_000_000;
+        desc
+    };
+    add("a sum of a million samples", &long, 0.1, 1e-6);
     Table {
         title: "Odd scenes",
         what: "Each renders without a value that is not finite, and the pixel in the middle is what the closed form says, \
-               within 10⁻⁴ (lights that are drawn: half a percent). Red: it is not.",
+               within 10⁻⁴ (lights that are drawn: half a percent; the long sum: 10⁻⁶). Red: it is not.",
         columns: Rung::columns(),
         rows,
     }
