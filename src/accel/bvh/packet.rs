@@ -6,16 +6,15 @@
 //! sixteen rays; at a leaf, each that meets it is tested as a single ray is: with the same results to the
 //! last bit.
 
-use super::super::block::{LANES, RayBlock, lanes_of};
+use super::super::block::{LANES, RayBlock, lanes_of, lanes_where};
 use super::node::{Content, Node, Tree, WIDTH};
 use super::ray::RaySetup;
 use super::simd::{Floats, Simd, Stack};
 use super::traverse::{Found, Items, STACK, ask};
 use super::triangle::ShearRay;
 
-/// The rays of a block whose directions have the same signs.
+/// The rays of a block whose directions have the same signs: the fields of [`RaySetup`], a lane each.
 pub(super) struct Packet {
-    rays: [RaySetup; LANES],
     active: u16,
     origin: [[f32; LANES]; 3],
     far_origin: [[f32; LANES]; 3],
@@ -24,6 +23,8 @@ pub(super) struct Packet {
     t_min: [f32; LANES],
     /// Negative infinity where nothing is looked for (any more).
     t_max: [f32; LANES],
+    last: [u32; LANES],
+    shear: [[f32; LANES]; 3],
     /// By axis, for the plane that is entered first and then for the other: the end of the interval of
     /// origins that counts, and both ends of that of reciprocals.
     intervals: [[[f32; 3]; 2]; 3],
@@ -34,39 +35,42 @@ pub(super) struct Packet {
 impl Packet {
     /// None where signs differ.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
     pub(super) fn new<const ROBUST: bool>(block: &RayBlock) -> Option<Self> {
+        const NOTHING: [f32; LANES] = [0.0; LANES];
         let mut packet = Self {
-            rays: [RaySetup::NOTHING; LANES],
             active: 0,
-            origin: [[0.0; LANES]; 3],
-            far_origin: [[0.0; LANES]; 3],
-            near: [[0.0; LANES]; 3],
-            far: [[0.0; LANES]; 3],
-            t_min: [0.0; LANES],
-            t_max: [f32::NEG_INFINITY; LANES],
+            origin: [NOTHING; 3],
+            far_origin: [NOTHING; 3],
+            near: [NOTHING; 3],
+            far: [NOTHING; 3],
+            t_min: NOTHING,
+            t_max: NOTHING,
+            last: [0; LANES],
+            shear: [NOTHING; 3],
             intervals: [[[0.0; 3]; 2]; 3],
             sign: [0; 3],
             least_t: 0.0,
         };
-        let mut sign = None;
-        for lane in block.lanes() {
-            let Some(setup) = RaySetup::new::<ROBUST>(&block.get(lane)) else { continue };
-            if *sign.get_or_insert(setup.sign) != setup.sign {
-                return None;
-            }
+        let mut is_ray = [false; LANES];
+        for i in 0..LANES {
+            let o = [block.org_x[i], block.org_y[i], block.org_z[i]];
+            let d = [block.dir_x[i], block.dir_y[i], block.dir_z[i]];
+            let (ray, is) = RaySetup::of::<ROBUST>(o, d, [block.t_min[i], block.t_max[i]]);
+            is_ray[i] = is;
             for axis in 0..3 {
-                packet.origin[axis][lane] = setup.origin[axis];
-                packet.far_origin[axis][lane] = setup.far_origin[axis];
-                packet.near[axis][lane] = setup.near[axis];
-                packet.far[axis][lane] = setup.far[axis];
+                packet.origin[axis][i] = ray.origin[axis];
+                packet.far_origin[axis][i] = ray.far_origin[axis];
+                packet.near[axis][i] = ray.near[axis];
+                packet.far[axis][i] = ray.far[axis];
+                packet.shear[axis][i] = ray.shear[axis];
             }
-            packet.t_min[lane] = setup.t_min;
-            packet.t_max[lane] = setup.t_max;
-            packet.active |= 1 << lane;
-            packet.rays[lane] = setup;
+            packet.t_min[i] = ray.t_min;
+            packet.t_max[i] = ray.t_max;
+            packet.last[i] = ray.last;
         }
-        packet.sign = sign.unwrap_or_default();
-        // Lanes without a ray repeat one that is there.
+        packet.active = block.active() & lanes_where(&is_ray);
+        // Lanes without a ray repeat one that is there, and look for nothing.
         let first = packet.active.trailing_zeros() as usize % LANES;
         for lane in lanes_of(!packet.active) {
             for axis in 0..3 {
@@ -76,20 +80,33 @@ impl Packet {
                 packet.far[axis][lane] = packet.far[axis][first];
             }
             packet.t_min[lane] = packet.t_min[first];
+            packet.t_max[lane] = f32::NEG_INFINITY;
         }
         packet.least_t = least(&packet.t_min);
         for axis in 0..3 {
             let (near, far) = (&packet.near[axis], &packet.far[axis]);
             let (origin, far_origin) = (&packet.origin[axis], &packet.far_origin[axis]);
+            let (low, high) = (least(near), most(near));
+            if low < 0.0 && high >= 0.0 {
+                return None;
+            }
+            packet.sign[axis] = usize::from(low < 0.0);
             let ends = if packet.sign[axis] == 0 {
                 [most(origin), least(far_origin)]
             } else {
                 [least(origin), most(far_origin)]
             };
-            packet.intervals[axis] =
-                [[ends[0], least(near), most(near)], [ends[1], least(far), most(far)]];
+            packet.intervals[axis] = [[ends[0], low, high], [ends[1], least(far), most(far)]];
         }
         Some(packet)
+    }
+
+    /// The ray of a lane, for triangles.
+    #[inline(always)]
+    fn shear_ray<S: Simd>(&self, simd: S, lane: usize) -> ShearRay<S::F8> {
+        let of = |lanes: &[[f32; LANES]; 3]| [lanes[0][lane], lanes[1][lane], lanes[2][lane]];
+        let (origin, shear) = (of(&self.origin), of(&self.shear));
+        ShearRay::of(simd, origin, shear, self.last[lane], self.t_min[lane])
     }
 
     /// The furthest that any ray goes.
@@ -244,8 +261,8 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
                 Content::Node(_) => {}
                 Content::Triangles(index) => {
                     let triangles = &tree.blocks[index];
-                    let shear = ShearRay::new(simd, &packet.rays[lane]);
-                    shear.each_hit::<S, ROBUST>(simd, triangles, best.t, |i, hit| {
+                    let ray = packet.shear_ray(simd, lane);
+                    ray.each_hit::<S, ROBUST>(simd, triangles, best.t, |i, hit| {
                         let found = Found::triangle(hit, triangles.ids[i]);
                         if found.is_before(best) {
                             *best = found;
@@ -285,20 +302,19 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
     packet.traverse(simd, tree, |packet, content, lanes| {
         for lane in lanes_of(lanes) {
             let lane = lane % LANES;
-            let (ray, setup) = (&block.get(lane), &packet.rays[lane]);
             let mut is_hit = false;
             match content {
                 Content::Node(_) => {}
                 Content::Triangles(index) => {
                     let triangles = &tree.blocks[index];
-                    let shear = ShearRay::new(simd, setup);
-                    shear.each_hit::<S, ROBUST>(simd, triangles, setup.t_max, |i, _| {
+                    let ray = packet.shear_ray(simd, lane);
+                    ray.each_hit::<S, ROBUST>(simd, triangles, packet.t_max[lane], |i, _| {
                         is_hit = !(OPAQUE && items.is_clear(triangles.ids[i]));
                         is_hit
                     });
                 }
                 Content::Item(item) => {
-                    is_hit = items.occluded::<S, OPAQUE>(simd, item, ray);
+                    is_hit = items.occluded::<S, OPAQUE>(simd, item, &block.get(lane));
                 }
             }
             if is_hit {

@@ -12,17 +12,13 @@ pub(super) struct RaySetup {
     /// Reciprocals of the direction, for where a slab is entered and where it is left; finite.
     pub(super) near: [f32; 3],
     pub(super) far: [f32; 3],
-    /// Which plane of a slab is entered first, by axis: 0 the lower, 1 the upper.
-    pub(super) sign: [usize; 3],
     pub(super) t_min: f32,
     /// Finite.
     pub(super) t_max: f32,
-    /// The axes, the one along which the direction is longest last.
-    pub(super) axes: [usize; 3],
-    /// By how much the first two grow along that one, and its reciprocal.
+    /// The axis along which the direction is longest: the last, as [`turned`] has them.
+    pub(super) last: u32,
+    /// By how much the other two grow along that one, and its reciprocal.
     pub(super) shear: [f32; 3],
-    /// The origin in the order of `axes`.
-    pub(super) pivot: [f32; 3],
 }
 
 /// How far slabs are widened, relative to the distance of their planes: three roundings in the plane's
@@ -40,58 +36,77 @@ impl RaySetup {
         far_origin: [0.0; 3],
         near: [0.0; 3],
         far: [0.0; 3],
-        sign: [0; 3],
         t_min: 0.0,
         t_max: 0.0,
-        axes: [0, 1, 2],
+        last: 2,
         shear: [0.0; 3],
-        pivot: [0.0; 3],
     };
 
     /// None where nothing can be hit: a number is not finite, the direction is zero, the ray has no length.
     #[inline(always)]
     pub(super) fn new<const ROBUST: bool>(ray: &Ray) -> Option<Self> {
-        let (o, d) = (ray.origin, ray.direction);
+        let (o, d) = (ray.origin.to_array(), ray.direction.to_array());
+        let (setup, is_ray) = Self::of::<ROBUST>(o, d, [ray.t_min, ray.t_max]);
+        is_ray.then_some(setup)
+    }
+
+    /// Whether anything can be hit, and if so, with what. Without branches, so that the compiler makes a
+    /// loop over several rays one over lanes.
+    #[inline(always)]
+    pub(super) fn of<const ROBUST: bool>(
+        o: [f32; 3],
+        d: [f32; 3],
+        [t_min, t_max]: [f32; 2],
+    ) -> (Self, bool) {
         // Zero times a finite number is zero; any other is NaN.
-        let sum = (o.x + o.y + o.z + d.x + d.y + d.z) * 0.0;
-        let t_max = ray.t_max.min(f32::MAX);
-        let size = d.abs();
-        let longest = size.max_element();
-        if sum != 0.0 || !(longest > 0.0) || !(ray.t_min < t_max) {
-            return None;
-        }
-        let z = if size.x == longest { 0 } else { 1 + usize::from(size.y != longest) };
-        // 0, 1, 2 → 1, 2, 0 → 2, 0, 1.
-        let x = if z == 2 { 0 } else { z + 1 };
-        let y = if z == 0 { 2 } else { z - 1 };
-        let pivot = o.to_array();
-        let (o, d) = ([o.x, o.y, o.z], d.to_array());
-        let along = 1.0 / d[z];
+        let sum = (o[0] + o[1] + o[2] + d[0] + d[1] + d[2]) * 0.0;
+        let t_max = if t_max < f32::MAX { t_max } else { f32::MAX };
+        let size = d.map(f32::abs);
+        let longest = if size[0] > size[1] { size[0] } else { size[1] };
+        let longest = if longest > size[2] { longest } else { size[2] };
+        let is_ray = (sum == 0.0) & (longest > 0.0) & (t_min < t_max);
+
+        let last = if size[0] == longest { 0 } else { 1 + u32::from(size[1] != longest) };
+        let along = 1.0 / turned(d, last)[2];
+        let [x, y, _] = turned(d, last);
         // Along a slab the reciprocal is huge, but finite, so that nothing is NaN; and the slab is left a
         // little behind the origin, so that a ray in the very plane of a face is inside for as long as any
         // ray goes (10¹³ units).
-        let mut far_origin = o;
-        let mut r = d.map(|d| (1.0 / d).clamp(-HUGE, HUGE));
-        for axis in 0..3 {
-            if d[axis].abs() < longest * 1e-18 {
-                r[axis] = HUGE.copysign(d[axis]);
-                let shift = (o[axis].abs() * f32::EPSILON).max(1e-24 / longest.min(1.0));
-                far_origin[axis] -= shift.copysign(d[axis]);
-            }
-        }
+        let least = 1e-24 / if longest < 1.0 { longest } else { 1.0 };
         let margin = if ROBUST { MARGIN } else { 0.0 };
-        Some(Self {
-            origin: o,
-            far_origin,
-            near: r.map(|r| r * (1.0 - margin)),
-            far: r.map(|r| r * (1.0 + margin)),
-            sign: r.map(|r| usize::from(r < 0.0)),
-            t_min: ray.t_min + 0.0,
-            t_max,
-            axes: [x, y, z],
-            shear: [d[x] * along, d[y] * along, along],
-            pivot: [pivot[x], pivot[y], pivot[z]],
-        })
+        let mut setup = Self { t_min: t_min + 0.0, t_max, last, ..Self::NOTHING };
+        for axis in 0..3 {
+            let (o, d) = (o[axis], d[axis]);
+            let is_along = d.abs() < longest * 1e-18;
+            let r = 1.0 / d;
+            let r = if is_along | (r.abs() > HUGE) { HUGE.copysign(d) } else { r };
+            let shift = o.abs() * f32::EPSILON;
+            let shift = if shift > least { shift } else { least }.copysign(d);
+            setup.origin[axis] = o;
+            setup.far_origin[axis] = if is_along { o - shift } else { o };
+            setup.near[axis] = r * (1.0 - margin);
+            setup.far[axis] = r * (1.0 + margin);
+        }
+        setup.shear = [x * along, y * along, along];
+        (setup, is_ray)
+    }
+
+    /// Which plane of a slab is entered first, by axis: 0 the lower, 1 the upper.
+    #[inline(always)]
+    pub(super) fn sign(&self) -> [usize; 3] {
+        self.near.map(|r| usize::from(r < 0.0))
+    }
+}
+
+/// What belongs to the axes, that of `last` last: 0, 1, 2 or 1, 2, 0 or 2, 0, 1.
+#[inline(always)]
+pub(super) fn turned<T: Copy>([x, y, z]: [T; 3], last: u32) -> [T; 3] {
+    if last == 0 {
+        [y, z, x]
+    } else if last == 1 {
+        [z, x, y]
+    } else {
+        [x, y, z]
     }
 }
 
@@ -127,7 +142,7 @@ impl<F: Floats> SlabRay<F> {
             origins: [splat(origins[0]), splat(origins[1])],
             reciprocals: [splat(reciprocals[0]), splat(reciprocals[1])],
             t_min: simd.splat8(ray.t_min),
-            sign: ray.sign,
+            sign: ray.sign(),
         }
     }
 

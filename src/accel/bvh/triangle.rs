@@ -8,13 +8,13 @@
 //! inside: a ray that meets a closed mesh at an edge or a vertex hits at least one triangle there.
 
 use super::node::TriangleBlock;
-use super::ray::RaySetup;
+use super::ray::{RaySetup, turned};
 use super::simd::{Floats, Simd};
 
 /// The ray in every lane, against eight triangles.
 #[derive(Clone, Copy)]
 pub(super) struct ShearRay<F> {
-    /// In the order of `axes`.
+    /// In the order of `axes`, of which the direction is longest along the last.
     origin: [F; 3],
     shear: [F; 2],
     axes: [usize; 3],
@@ -45,13 +45,24 @@ struct Candidates<F> {
 impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
     #[inline(always)]
     pub(super) fn new<S: Simd<F8 = F>>(simd: S, ray: &RaySetup) -> Self {
-        let [x, y, z] = ray.pivot;
+        Self::of(simd, ray.origin, ray.shear, ray.last, ray.t_min)
+    }
+
+    /// By the parts of a [`RaySetup`].
+    #[inline(always)]
+    pub(super) fn of<S: Simd<F8 = F>>(
+        simd: S,
+        origin: [f32; 3],
+        [x, y, along]: [f32; 3],
+        last: u32,
+        t_min: f32,
+    ) -> Self {
         Self {
-            origin: [simd.splat8(x), simd.splat8(y), simd.splat8(z)],
-            shear: [simd.splat8(ray.shear[0]), simd.splat8(ray.shear[1])],
-            axes: ray.axes,
-            along: ray.shear[2],
-            t_min: ray.t_min,
+            origin: turned(origin, last).map(|o| simd.splat8(o)),
+            shear: [simd.splat8(x), simd.splat8(y)],
+            axes: turned([0, 1, 2], last),
+            along,
+            t_min,
         }
     }
 
