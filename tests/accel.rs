@@ -371,22 +371,23 @@ fn no_ray_hits_the_surface_that_it_leaves() {
 fn no_ray_of_one_hits_the_surface_that_it_leaves(accelerator: AccelKind) {
     let sphere = |center: DVec3, radius: f64| ShapeDesc::Sphere { center, radius };
     let n = if common::verify() { 200_000 } else { 20_000 };
-    for (offset, scale, squeeze) in [
-        (0.0, 1.0, 0.3),
-        (0.0, 1e-4, 0.3),
-        (0.0, 1e5, 0.3),
-        (300.0, 1.0, 0.3),
-        (2e4, 10.0, 0.3),
-        (10.0, 1.0, 1e-3),
+    // Turned and squeezed by turns, the other way round where the last is true.
+    for (offset, scale, squeeze, turned_first) in [
+        (0.0, 1.0, 0.3, false),
+        (0.0, 1e-4, 0.3, false),
+        (0.0, 1e5, 0.3, false),
+        (300.0, 1.0, 0.3, false),
+        (2e4, 10.0, 0.3, false),
+        (10.0, 1.0, 1e-3, false),
+        (10.0, 1.0, 1e-3, true),
     ] {
         let center = DVec3::new(offset, -offset, 0.5 * offset);
         // Something at the origin keeps the world from being recentred on the object.
         let anchor = sphere(DVec3::ZERO, 1e-3 * scale);
-        let uneven = DAffine3::from_mat3_translation(
-            DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0))
-                * DMat3::from_diagonal(DVec3::new(1.0, squeeze, -2.0) * scale),
-            center,
-        );
+        let turn = DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0));
+        let squeezing = DMat3::from_diagonal(DVec3::new(1.0, squeeze, -2.0) * scale);
+        let linear = if turned_first { squeezing * turn } else { turn * squeezing };
+        let uneven = DAffine3::from_mat3_translation(linear, center);
         let kinds =
             ["sphere", "ellipsoid", "ellipsoid copy", "box", "cone", "torus", "mesh", "mesh copy"];
         for kind in kinds {

@@ -30,7 +30,8 @@ const REFERENCE: [(&str, &str); 6] = [
 ];
 
 /// Pages with scenes and links beside the reference.
-const OTHERS: [(&str, &str); 6] = [
+const OTHERS: [(&str, &str); 7] = [
+    ("docs/approximations.md", include_str!("../docs/approximations.md")),
     ("docs/output.md", include_str!("../docs/output.md")),
     ("docs/numerics.md", include_str!("../docs/numerics.md")),
     ("docs/trade.md", include_str!("../docs/trade.md")),
@@ -666,6 +667,7 @@ fn the_reference_has_the_defaults() {
     }
     assert_eq!(settings.epsilon, Epsilon::Auto);
     assert_eq!((settings.wavelength, settings.ao_distance), (None, None));
+    assert_eq!(settings.texture_filter, None);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use alhazen::scene::Scene;
 mod common;
 use common::{alhazen, stderr, verify};
 
-/// Soft shadows of a large lamp on a plane.
+/// Soft shadows of a large lamp on a plane of tiles.
 const SCENE: &str = r#"
 [image]
 size = [64, 48]
@@ -23,6 +23,9 @@ target = [0, 0.5, 0]
 [materials.grey]
 type = "diffuse"
 reflectance = 0.6
+[materials.tiles]
+type = "diffuse"
+reflectance = { checker = [0.65, 0.55], scale = 0.3 }
 [[objects]]
 shape = "sphere"
 center = [0, 0.8, 0]
@@ -32,7 +35,7 @@ material = "grey"
 shape = "plane"
 point = [0, 0, 0]
 normal = [0, 1, 0]
-material = "grey"
+material = "tiles"
 [[lights]]
 type = "disk"
 center = [2, 5, 2]

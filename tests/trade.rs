@@ -173,6 +173,13 @@ fn references_are_kept_by_what_they_depend_on() {
 fn knobs_are_those_that_matter_and_do_what_their_flags_do() {
     let folder = folder();
     let folder = folder.path();
+    // With a picture on the floor, and glass that disperses.
+    run(folder, &"render scene.toml -q -o floor.png --samples 1".split(' ').collect::<Vec<_>>());
+    let scene =
+        SCENE.replace("type = \"dielectric\"", "type = \"dielectric\"\nior = { abbe = [1.5, 30] }");
+    let floor = "radius = 20\nmaterial = \"floor\"\n[materials.floor]\ntype = \"diffuse\"\n\
+                 reflectance = { image = \"floor.png\", mapping = \"planar\" }\n";
+    std::fs::write(folder.join("scene.toml"), scene.replace("radius = 20\n", floor)).unwrap();
     let quick = ["--no-cache", "--reference-samples", "16", "--samples", "2", "--size", "24x16"];
     let names = |report: &Value| -> BTreeSet<String> {
         let knobs = report["knobs"].as_array().unwrap();
@@ -180,9 +187,17 @@ fn knobs_are_those_that_matter_and_do_what_their_flags_do() {
     };
     let all = report(folder, &quick);
     let found = names(&all);
-    for name in
-        ["max_depth", "prune", "roulette", "shadow_samples", "shadows", "epsilon", "precision"]
-    {
+    for name in [
+        "max_depth",
+        "prune",
+        "roulette",
+        "shadow_samples",
+        "shadows",
+        "epsilon",
+        "precision",
+        "texture_filter",
+        "wavelength",
+    ] {
         assert!(found.contains(name), "{name}: {found:?}");
     }
     assert!(!found.contains("light_samples") && !found.contains("tolerance"), "{found:?}");
@@ -196,7 +211,16 @@ fn knobs_are_those_that_matter_and_do_what_their_flags_do() {
     run(folder, &flat);
     let flat = std::fs::read_to_string(folder.join("flat.json")).unwrap();
     let flat = names(&serde_json::from_str(&flat).unwrap());
-    for name in ["max_depth", "prune", "roulette", "shadow_samples", "shadows", "epsilon"] {
+    for name in [
+        "max_depth",
+        "prune",
+        "roulette",
+        "shadow_samples",
+        "shadows",
+        "epsilon",
+        "texture_filter",
+        "wavelength",
+    ] {
         assert!(!flat.contains(name), "{name}: {flat:?}");
     }
 

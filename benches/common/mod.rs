@@ -3,6 +3,7 @@
 
 pub mod peers;
 pub mod record;
+pub mod still_life;
 pub mod w2;
 
 use std::time::Instant;

@@ -26,6 +26,7 @@ use crate::material::Material;
 use crate::math::Bounds;
 use crate::medium::volume::Volume;
 use crate::medium::{Fog, FogProfile, Interior};
+use crate::texture::TexelFilter;
 
 /// Vertical field of view where none is given.
 const DEFAULT_FOV: f64 = 40.0;
@@ -325,6 +326,9 @@ impl Scene {
         // Index 0 is the neutral default.
         let mut maps = vec![Maps::default()];
         maps.extend(desc.materials.iter().map(|material| material.maps.clone()));
+        if let Some(filter) = desc.settings.texture_filter {
+            maps.iter_mut().for_each(|maps| maps.filter_pictures(filter));
+        }
         errors.extend(check_materials(&desc));
         errors.extend(check_volumes(&desc.volumes));
         let glows: Vec<bool> = [false]
@@ -536,6 +540,11 @@ impl Scene {
     #[inline]
     pub fn has_maps(&self) -> bool {
         !self.maps.is_empty()
+    }
+
+    /// How textures that are pictures are filtered, each.
+    pub fn texture_filters(&self) -> impl Iterator<Item = TexelFilter> {
+        self.maps.iter().flat_map(Maps::texture_filters)
     }
 
     /// What there is to hit.

@@ -17,6 +17,7 @@ use crate::light::Falloff;
 use crate::material::Material;
 use crate::math::Bounds;
 use crate::medium::Fog;
+use crate::texture::TexelFilter;
 
 /// Where something was written: `scene.toml:12:3`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -167,6 +168,8 @@ pub struct RenderSettings {
     pub ao_distance: Option<f64>,
     /// The reconstruction filter.
     pub filter: Filter,
+    /// How all textures that are pictures are filtered; as each says where not given.
+    pub texture_filter: Option<TexelFilter>,
     /// How rays leave surfaces.
     pub epsilon: Epsilon,
     /// Work put into the hierarchy.
@@ -192,6 +195,7 @@ impl Default for RenderSettings {
             wavelength: None,
             ao_distance: None,
             filter: Filter::default(),
+            texture_filter: None,
             epsilon: Epsilon::Auto,
             build_quality: BuildQuality::default(),
             compact: Compact::default(),

@@ -9,7 +9,9 @@ use crate::accel::{Geometry, Hit, affine_from_rows};
 use crate::geometry::{AnalyticShape, Parameters, Shapes, Sphere, with_shapes};
 use crate::material::Material;
 use crate::math::Ray;
-use crate::texture::{BumpGradient, Footprint, Mapping, MipMap, Space, Texture, TexturePoint};
+use crate::texture::{
+    BumpGradient, Footprint, Mapping, MipMap, Space, TexelFilter, Texture, TexturePoint,
+};
 
 /// The textures of a material. What has none keeps the material's own value.
 #[derive(Debug, Clone, Default)]
@@ -47,6 +49,25 @@ impl Maps {
         })
     }
 
+    /// How each of these is filtered.
+    pub(super) fn texture_filters(&self) -> impl Iterator<Item = TexelFilter> {
+        self.all().filter_map(|texture| match texture {
+            Texture::Image(texture) => Some(texture.filter),
+            _ => None,
+        })
+    }
+
+    /// Filters all pictures among them like this.
+    pub(super) fn filter_pictures(&mut self, filter: TexelFilter) {
+        let relief = self.normal.iter_mut().chain(&mut self.bump).map(|(texture, _)| texture);
+        let colors = self.color.iter_mut().chain(&mut self.specular).chain(&mut self.mirror);
+        for texture in colors.chain(relief) {
+            if let Texture::Image(texture) = texture {
+                texture.filter = filter;
+            }
+        }
+    }
+
     fn all(&self) -> impl Iterator<Item = &Texture> {
         let relief = self.normal.iter().chain(&self.bump).map(|(texture, _)| texture);
         self.color.iter().chain(&self.specular).chain(&self.mirror).chain(relief)
@@ -78,15 +99,15 @@ pub struct Cone {
     pub turn: f32,
 }
 
-/// Many samples share a pixel: each needs to see less of it, but not so little that few samples alias.
-const LEAST_SHARE: f32 = 0.125;
+/// Many samples share a pixel: each needs to see less of it, but not so little that few samples alias. The
+/// same for any number of samples: what ends by its error, or goes on later, is the picture of so many.
+const SHARE: f32 = 0.25;
 
 impl Cone {
     /// The cone of one of a pixel's samples.
     pub fn of_pixel(scene: &Scene, ray: &Ray) -> Self {
-        let share = (1.0 / (scene.settings.samples as f32).sqrt()).max(LEAST_SHARE);
         let (width, spread) = scene.camera.pixel_cone();
-        let (width, spread) = (width * share, spread * share);
+        let (width, spread) = (width * SHARE, spread * SHARE);
         // Rays of a far camera do not start at it.
         let from_camera = (ray.origin.as_dvec3() - scene.camera.pose().eye).length() as f32;
         Self { width: width + spread * from_camera, spread, turn: 0.0 }

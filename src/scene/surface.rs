@@ -255,3 +255,103 @@ pub(super) fn to_world(local: &Local, rows: &Transform3x4) -> Local {
         normal: to_world(local.normal),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::rows_from_affine;
+    use crate::geometry::Sphere;
+    use glam::{DAffine3, DQuat};
+
+    /// Numbers in [−1, 1).
+    fn numbers(seed: u32) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+        }
+    }
+
+    /// Positions are no further off than is stated, nor is much more stated than there may be.
+    fn assert_bounded(what: &str, cases: impl Iterator<Item = (DVec3, Local)>, at_most: f64) {
+        let mut worst = 0f64;
+        for (truth, local) in cases {
+            let off = (local.position.as_dvec3() - truth).abs().max_element();
+            worst = worst.max(off / f64::from(local.error));
+        }
+        assert!(worst <= 1.0, "{what}: {worst} of the bound");
+        assert!(worst >= 1.0 / at_most, "{what}: {worst} of the bound: it is needlessly wide");
+    }
+
+    #[test]
+    fn positions_lie_within_their_bounds() {
+        for offset in [0.0, 1.0, 1e4] {
+            let mut next = numbers(1);
+            let mut corner = || DVec3::new(next() + offset, next() - offset, next()).as_vec3();
+            let corners: Vec<[Vec3; 3]> =
+                (0..50_000).map(|_| [corner(), corner(), corner()]).collect();
+            let mut next = numbers(2);
+            let cases = corners.into_iter().map(|[a, b, c]| {
+                let (u, v) = (0.5 + 0.5 * next(), 0.5 + 0.5 * next());
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let (u, v) = (u as f32, v as f32);
+                let w = 1.0 - f64::from(u) - f64::from(v);
+                let weights = [w, f64::from(u), f64::from(v)];
+                let parts = [a, b, c].into_iter().zip(weights).map(|(p, w)| p.as_dvec3() * w);
+                (parts.sum(), on_triangle([a, b, c], u, v, None))
+            });
+            assert_bounded("triangle", cases, 6.5);
+        }
+    }
+
+    /// Along the normal: where on the sphere a hit is meant to be is not known.
+    #[test]
+    fn shapes_lie_within_their_bounds() {
+        let mut next = numbers(3);
+        let mut worst = 0f64;
+        for _ in 0..50_000 {
+            let center = DVec3::new(1000.0 * next(), 1000.0 * next(), 1000.0 * next());
+            let sphere = Sphere { center, radius: 1.0 };
+            let direction = DVec3::new(next(), next(), next()).normalize();
+            let ray = Ray::new((center - direction * 3.0).as_vec3(), direction.as_vec3());
+            let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+            let found = sphere.intersect(o, d, 0.0, f64::INFINITY).unwrap();
+            let hit =
+                Hit { t: found.t as f32, u: 0.0, v: 0.0, primitive: 0, geometry: 0, copy: None };
+            let local = on_shape(&sphere, &ray, &hit, None);
+            let out = local.position.as_dvec3() - center;
+            let reach = f64::from(local.error) * out.normalize().abs().element_sum();
+            worst = worst.max((out.length() - 1.0).abs() / reach);
+        }
+        assert!((0.3..=1.0).contains(&worst), "{worst} of the bound");
+    }
+
+    /// What a query sees of a copy, which takes the ray to the copy's space by an inverse that is rounded to
+    /// f32: the point itself, taken there and back.
+    #[test]
+    fn copies_lie_within_their_bounds() {
+        let mut next = numbers(4);
+        let mut cases = Vec::new();
+        for _ in 0..20_000 {
+            let turn = |next: &mut dyn FnMut() -> f64| {
+                DMat3::from_quat(DQuat::from_xyzw(next(), next(), next(), next()).normalize())
+            };
+            let squeeze =
+                DMat3::from_diagonal(DVec3::new(1.0, 10f64.powf(2.0 * next() - 2.0), 2.0));
+            let linear = turn(&mut next) * squeeze * turn(&mut next);
+            let translation = DVec3::new(next(), next(), next()) * 10.0;
+            let rows = rows_from_affine(&DAffine3::from_mat3_translation(linear, translation));
+            let p = DVec3::new(next(), next(), next()).as_vec3();
+            let local =
+                Local { position: p, error: 0.0, geometric_normal: Vec3::Y, normal: Vec3::Y };
+            let placed = to_world(&local, &rows);
+            let exact = affine_from_rows(&rows);
+            let rounded = affine_from_rows(&rows_from_affine(&exact.inverse()));
+            // Back by the true way: by how much the rounded inverse errs, as the world sees it.
+            let there = rounded.transform_point3(placed.position.as_dvec3());
+            let seen = exact.transform_point3(there);
+            cases.push((seen, placed));
+        }
+        assert_bounded("copy", cases.into_iter(), 40.0);
+    }
+}

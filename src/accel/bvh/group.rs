@@ -125,7 +125,7 @@ impl GroupTree {
     }
 
     /// A primitive's geometry, the number of that and its own in it.
-    #[inline]
+    #[inline(always)]
     pub(super) fn primitive(&self, id: u32) -> (&Geometry, u32, u32) {
         let geometry = match self.first_primitives.len() {
             2 => 0,

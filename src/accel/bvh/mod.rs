@@ -113,7 +113,7 @@ impl BvhAccel {
     }
 
     /// Our ids for those of the trees.
-    #[inline]
+    #[inline(always)]
     fn hit(&self, found: &Found) -> Hit {
         let (copy, group) = match found.copy {
             Found::NO_COPY => (None, &self.root),

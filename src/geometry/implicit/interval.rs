@@ -235,6 +235,10 @@ impl Number for Interval {
         Self { lo: e.lo.max(0.0), ..e }
     }
     fn ln(self) -> Self {
+        if self.hi == 0.0 {
+            // What f64 makes of ln 0: below every number.
+            return Self { lo: f64::NEG_INFINITY, hi: f64::MIN };
+        }
         if !(self.hi > 0.0) {
             return Self::EMPTY;
         }

@@ -7,6 +7,7 @@ use crate::film::Filter;
 use crate::io::document::{Node, Value};
 use crate::io::fields::{Fields, Reader};
 use crate::scene::{Epsilon, IntegratorKind, RenderSettings, Shadows};
+use crate::texture::TexelFilter;
 
 pub(super) fn settings(reader: &Reader<'_>, fields: Fields<'_, '_>) -> RenderSettings {
     let default = RenderSettings::default();
@@ -33,6 +34,7 @@ pub(super) fn settings(reader: &Reader<'_>, fields: Fields<'_, '_>) -> RenderSet
         filter: fields
             .choice("filter", &Filter::ALL.map(|f| (f.name(), f)))
             .unwrap_or(default.filter),
+        texture_filter: fields.choice("texture_filter", &TexelFilter::ALL.map(|f| (f.name(), f))),
         epsilon: match fields.get("epsilon") {
             None => default.epsilon,
             Some(node) => match &node.value {

@@ -2,6 +2,7 @@
 
 use crate::accel::{AccelKind, BuildOptions, BuildQuality, Compact, Precision};
 use crate::scene::{Epsilon, IntegratorKind, RenderSettings, Scene, Shadows, Tolerance};
+use crate::texture::TexelFilter;
 
 /// A way to render a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,6 +63,12 @@ impl Choice {
             set("shadow_samples", a.shadow_samples.to_string()),
         );
         say(a.light_samples != b.light_samples, set("light_samples", a.light_samples.to_string()));
+        if let Some(filter) = a.texture_filter.filter(|_| a.texture_filter != b.texture_filter) {
+            say(true, set("texture_filter", filter.name().into()));
+        }
+        if let Some(nanometres) = a.wavelength.filter(|_| a.wavelength != b.wavelength) {
+            say(true, set("wavelength", nanometres.to_string()));
+        }
         let epsilon = match a.epsilon {
             Epsilon::Auto => "\"auto\"".to_owned(),
             Epsilon::Fixed(x) => format!("{x:e}"),
@@ -156,6 +163,18 @@ pub fn knobs(scene: &Scene, base: &Choice) -> Vec<Knob> {
         let modes = [Shadows::None, Shadows::Opaque, Shadows::Tinted, Shadows::Fresnel]
             .map(|mode| (mode.name().to_owned(), with(&|c| c.settings.shadows = mode)));
         add("shadows", Effect::Look, modes.into());
+    }
+    if settings.integrator != IntegratorKind::Ao {
+        let others = TexelFilter::ALL.into_iter();
+        let others = others.filter(|&filter| scene.texture_filters().any(|other| other != filter));
+        let filters = others.map(|filter| {
+            (filter.name().to_owned(), with(&|c| c.settings.texture_filter = Some(filter)))
+        });
+        add("texture_filter", Effect::Bias, filters.collect());
+    }
+    if has_tree && r.dispersive > 0 {
+        let yellow = with(&|c| c.settings.wavelength = Some(587.6));
+        add("wavelength", Effect::Look, vec![("587.6 nm".into(), yellow)]);
     }
     if !scene.tessellations.is_empty() {
         let factors = [0.25, 0.5, 2.0, 4.0, 8.0].map(|factor| {
