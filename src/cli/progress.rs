@@ -101,13 +101,12 @@ impl Progress {
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
                 if last.elapsed() > LINE_EVERY {
                     *last = Instant::now();
-                    let left = if done > 0.0 { seconds / done - seconds } else { f64::INFINITY };
-                    super::tell(&format!(
-                        "{}: {:.0} %, {left:.0} s left {}",
-                        self.phase,
-                        100.0 * done,
-                        rate()
-                    ));
+                    let left = match seconds / done - seconds {
+                        left if left.is_finite() => format!(", {left:.0} s left"),
+                        _ => String::new(),
+                    };
+                    let (phase, percent) = (&self.phase, 100.0 * done);
+                    super::tell(&format!("{phase}: {percent:.0} %{left} {}", rate()));
                 }
             }
         }
