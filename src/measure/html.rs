@@ -6,7 +6,7 @@ p{color:#4a525a}table{border-collapse:collapse;width:100%;font-size:.86em;font-v
 th,td{padding:.25rem .45rem;text-align:right;border-bottom:1px solid #e3e6e9}th{font-weight:600;color:#4a525a}\
 th:first-child,td:first-child{text-align:left}.wrong{color:#b3261e;font-weight:600}.none{color:#8a929a}\
 svg{display:block;width:100%;height:auto;margin:.4rem 0 1rem}svg text{font:12px system-ui,sans-serif;fill:#1b1f24}\
-svg .faint{fill:#6a727a}figure{margin:0}figcaption{font-weight:600}\
+svg .faint{fill:#6a727a}svg .name{paint-order:stroke;stroke:#fff;stroke-width:4px;stroke-linejoin:round}figure{margin:0}figcaption{font-weight:600}\
 td,th{white-space:nowrap}.strip img{width:236px;height:auto}.strip{display:flex;flex-wrap:wrap;gap:.6rem;margin:.6rem 0 1rem}.strip figcaption{font-weight:400;font-size:.85em;\
 color:#4a525a}.front{background:#eef4ea}pre{background:#f4f6f8;padding:.6rem .8rem;overflow-x:auto;white-space:pre-wrap}";
 

@@ -100,7 +100,7 @@ pub enum Effect {
     Noise,
     /// Time, and the expected picture with it.
     Bias,
-    /// What the picture is meant to show: never recommended.
+    /// What the picture is meant to show, or may show in a few places: never recommended.
     Look,
 }
 
@@ -195,7 +195,8 @@ pub fn knobs(scene: &Scene, base: &Choice) -> Vec<Knob> {
             (format!("{length:e}"), with(&|c| c.settings.epsilon = Epsilon::Fixed(length)))
         });
         let auto = ("auto".to_owned(), with(&|c| c.settings.epsilon = Epsilon::Auto));
-        add("epsilon", Effect::Bias, [auto].into_iter().chain(lengths).collect());
+        // A distance that hardly shows in the mean may still leave spots where things touch.
+        add("epsilon", Effect::Look, [auto].into_iter().chain(lengths).collect());
     }
     let qualities = [BuildQuality::Low, BuildQuality::Medium]
         .map(|quality| (quality.name().to_owned(), with(&|c| c.settings.build_quality = quality)));

@@ -100,7 +100,7 @@ pub fn quoted(words: &[String]) -> String {
 fn section(report: &TradeReport, knob: &KnobReport, png: Png<'_>) -> String {
     let what = match knob.effect {
         "noise" => "Changes time and noise, not the expected picture.",
-        "look" => "Changes what the picture is meant to show.",
+        "look" => "Changes what the picture shows, if in few places: never recommended.",
         _ => "May change the picture for speed.",
     };
     let mut text = format!("<h2>{}</h2>\n<p>{what}</p>\n", escaped(knob.name));
@@ -294,7 +294,7 @@ fn chart(report: &TradeReport) -> String {
     for (name, colour, at_x, at_y) in names {
         let _ = writeln!(
             svg,
-            "<text x=\"{:.1}\" y=\"{at_y:.1}\" style=\"fill:{colour}\">{}</text>",
+            "<text x=\"{:.1}\" y=\"{at_y:.1}\" class=\"name\" style=\"fill:{colour}\">{}</text>",
             at_x + 9.0,
             escaped(name)
         );
