@@ -962,6 +962,12 @@ fn odd_scenes() -> Table {
     let denormal =
         || with_mesh(vec![0.3, 1.0, 0.0, 0.3 + tiny, 1.0, 0.0, 0.3, 1.0, tiny], vec![[0, 1, 2]]);
     add("a triangle of denormal size", &denormal, 0.5, ROUNDED);
+    let nothing = || {
+        let mut desc = empty();
+        desc.image.background = Some(Rgb::splat(0.5));
+        desc
+    };
+    add("nothing but a background", &nothing, 0.5, ROUNDED);
     add("a mesh without triangles", &|| with_mesh(vec![0.0, 1.0, 0.0], Vec::new()), 0.5, ROUNDED);
     let doubled = || {
         let xyz = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0f32]];
