@@ -37,8 +37,9 @@ fuzz: ## Feeds every parser with broken input, SECONDS (600) each; ends at the f
 	@$(SETUP) fuzz
 	./scripts/fuzz.sh $(or $(SECONDS),600)
 
-lint: setup ## Formatting, clippy and documentation without warnings
+lint: setup ## Formatting, clippy and documentation without warnings; locks that fit
 	$(CARGO) fmt --check
+	$(CARGO) update --quiet --locked --workspace --manifest-path fuzz/Cargo.toml
 	$(CARGO) clippy --locked --all-targets --features crates -- -D warnings
 	$(CARGO) clippy --locked --all-targets --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items

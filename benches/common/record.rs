@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use alhazen::accel::{Hit, HitBlock, RayBlock, RayQuery};
+use alhazen::accel::{Hit, HitBlock, LANES, RayBlock, RayQuery};
 use alhazen::integrator::{CameraBlock, Integrator, RayCounts};
 use alhazen::math::Ray;
 use alhazen::scene::Scene;
@@ -46,7 +46,8 @@ impl Query {
     }
 }
 
-/// Answers queries and writes them down.
+/// Answers queries and writes them down: rays of the tree as they would be asked by whoever knows nothing of
+/// where they end, though the tree bounds those within spheres.
 struct Recorder<'a, Q> {
     query: &'a Q,
     asked: Mutex<Vec<Query>>,
@@ -60,7 +61,7 @@ impl<Q> Recorder<'_, Q> {
 
 impl<Q: RayQuery> RayQuery for Recorder<'_, Q> {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.note(Query::Closest(*ray));
+        self.note(Query::Closest(Ray { t_max: f32::INFINITY, ..*ray }));
         self.query.intersect(ray)
     }
 
@@ -74,7 +75,9 @@ impl<Q: RayQuery> RayQuery for Recorder<'_, Q> {
     }
 
     fn intersect_block(&self, rays: &RayBlock) -> HitBlock {
-        self.note(Query::ClosestBlock(Box::new(rays.clone())));
+        let mut endless = Box::new(rays.clone());
+        endless.t_max = [f32::INFINITY; LANES];
+        self.note(Query::ClosestBlock(endless));
         self.query.intersect_block(rays)
     }
 

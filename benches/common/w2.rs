@@ -87,8 +87,13 @@ pub fn balls() -> Vec<Ball> {
     balls.collect()
 }
 
-/// The scene, at 4 samples a pixel and 8 bounces.
+/// The scene, at 4 samples a pixel and 8 bounces, with the default accelerator.
 pub fn scene(change: impl FnOnce(&mut SceneDesc)) -> Scene {
+    scene_in(AccelKind::default(), change)
+}
+
+/// With one of the caller's choice.
+pub fn scene_in(kind: AccelKind, change: impl FnOnce(&mut SceneDesc)) -> Scene {
     let mut desc = SceneDesc::default();
     desc.image.size = super::SIZE;
     desc.settings.samples = 4;
@@ -127,7 +132,7 @@ pub fn scene(change: impl FnOnce(&mut SceneDesc)) -> Scene {
         desc.objects.push(ObjectDesc::new(shape, Some(&format!("kind{}", ball.kind))));
     }
     change(&mut desc);
-    Scene::build_quietly(desc, AccelKind::default()).expect("a sound scene")
+    Scene::build_quietly(desc, kind).expect("a sound scene")
 }
 
 /// Every other tile of the floor.

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::build::Scene;
 use crate::accel::{Geometry, Hit, Transform3x4, affine_from_rows};
-use crate::geometry::{AnalyticShape, Shapes, TriangleMesh, with_shapes};
+use crate::geometry::{AnalyticShape, Shapes, Sphere, TriangleMesh, with_shapes};
 use crate::material::Material;
 use crate::math::{Ray, gamma, offset_ray_origin, unit_or_zero};
 use crate::scene::desc::Epsilon;
@@ -27,6 +27,8 @@ pub struct SurfacePoint<'a> {
     pub material: &'a Material,
     /// The scene's number of that material.
     pub material_index: u32,
+    /// The sphere that it lies on, where that is no copy.
+    pub(super) sphere: Option<&'a Sphere>,
 }
 
 /// Position, error, outward geometric and shading normal (of unit length, or zero where there is none)
@@ -69,7 +71,8 @@ impl Scene {
                 &self.world.root.geometries[hit.geometry as usize]
         {
             let material_index = self.look(hit).material;
-            let local = on_shape(&spheres[hit.primitive as usize], ray, hit, None);
+            let sphere = &spheres[hit.primitive as usize];
+            let local = on_shape(sphere, ray, hit, None);
             let is_front = local.normal.dot(ray.direction) <= 0.0;
             let normal = if is_front { local.normal } else { -local.normal };
             return SurfacePoint {
@@ -80,6 +83,7 @@ impl Scene {
                 is_front,
                 material: &self.materials[material_index as usize],
                 material_index,
+                sphere: Some(sphere),
             };
         }
         self.surface_of_any(ray, hit)
@@ -113,6 +117,7 @@ impl Scene {
             is_front,
             material: &self.materials[material_index as usize],
             material_index,
+            sphere: None,
         }
     }
 
@@ -128,6 +133,23 @@ impl Scene {
     pub fn spawn(&self, point: &SurfacePoint<'_>, direction: Vec3, distance: f32) -> Ray {
         let (p, n) = (point.position, point.geometric_normal);
         spawn(self.settings.epsilon, p, point.error, n, direction, distance)
+    }
+
+    /// The ray that leaves `point` into `direction` (unit length) for whatever comes. Within a sphere it will
+    /// come to its far side, so that nothing beyond needs to be looked at: what it hits is the same.
+    #[inline]
+    pub fn spawn_on(&self, point: &SurfacePoint<'_>, direction: Vec3) -> Ray {
+        let mut ray = self.spawn(point, direction, f32::INFINITY);
+        if let Some(sphere) = point.sphere
+            && (direction.dot(point.geometric_normal) < 0.0) == point.is_front
+        {
+            let (o, d) = (ray.origin.as_dvec3(), direction.as_dvec3());
+            // By the arithmetic that queries use.
+            if let Some(far) = sphere.intersect(o, d, ray.t_min.into(), f64::INFINITY) {
+                ray.t_max = (far.t as f32).next_up();
+            }
+        }
+        ray
     }
 }
 
@@ -281,6 +303,50 @@ mod tests {
         }
         assert!(worst <= 1.0, "{what}: {worst} of the bound");
         assert!(worst >= 1.0 / at_most, "{what}: {worst} of the bound: it is needlessly wide");
+    }
+
+    /// A ray within a sphere is bounded by its far side, and hits what an endless one does, to the last bit:
+    /// that far side, or what stands in between.
+    #[test]
+    fn bounds_within_spheres_hide_nothing() {
+        use crate::accel::AccelKind;
+        use crate::scene::{ObjectDesc, SceneDesc, ShapeDesc};
+
+        let sphere = |center, radius| ObjectDesc::new(ShapeDesc::Sphere { center, radius }, None);
+        for &kind in AccelKind::ALL {
+            let mut desc = SceneDesc::default();
+            desc.objects.push(sphere(DVec3::ZERO, 1.0));
+            desc.objects.push(sphere(DVec3::new(0.4, 0.0, 0.0), 0.3));
+            // Overlaps the first.
+            desc.objects.push(sphere(DVec3::new(0.0, 1.0, 0.0), 0.2));
+            let scene = Scene::build_quietly(desc, kind).unwrap();
+            let mut next = numbers(3);
+            let mut unit = || DVec3::new(next(), next(), next()).normalize_or(DVec3::X).as_vec3();
+            let (mut bounded, mut short) = (0, 0);
+            for i in 0..4000 {
+                let towards = Ray::new(unit() * 3.0, Vec3::ZERO);
+                let ray =
+                    Ray { direction: (unit() * 0.99 - towards.origin).normalize(), ..towards };
+                let query = scene.accel.query();
+                let Some(hit) = query.intersect(&ray) else { continue };
+                let point = scene.surface(&ray, &hit);
+                let n = point.geometric_normal;
+                // Inward, every third time nearly along the surface; or outward.
+                let w = match i % 3 {
+                    0 => (unit() - n).normalize_or(-n),
+                    1 => (unit().cross(n).normalize_or(-n) - n * 1e-4).normalize(),
+                    _ => (unit() + n * 1.1).normalize(),
+                };
+                let on = scene.spawn_on(&point, w);
+                let endless = scene.spawn(&point, w, f32::INFINITY);
+                assert_eq!((on.origin, on.t_min), (endless.origin, endless.t_min));
+                assert_eq!(query.intersect(&on), query.intersect(&endless), "{kind:?}: {on:?}");
+                bounded += usize::from(on.t_max < 3.0);
+                short +=
+                    usize::from(query.intersect(&on).is_some_and(|hit| hit.t < 0.9 * on.t_max));
+            }
+            assert!(bounded > 1000 && short > 100, "{kind:?}: {bounded}, {short}");
+        }
     }
 
     #[test]

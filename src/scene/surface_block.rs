@@ -52,6 +52,7 @@ impl SurfaceBlock {
             is_front: self.is_front[lane],
             material: self.material(scene, lane),
             material_index: self.material[lane],
+            sphere: None,
         }
     }
 

@@ -9,8 +9,9 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::super::AccelError;
-use super::node::{Child, Node, Tree, TriangleBlock, WIDTH};
+use super::node::{Child, Node, SphereBlock, Tree, TriangleBlock, WIDTH};
 use super::watch::Watch;
+use crate::geometry::Sphere;
 
 /// Below so many levels of nodes, boxes are split in halves of equal number: coordinates that grow
 /// geometrically would make a tree as deep as they are many.
@@ -20,8 +21,16 @@ const SAH_DEPTH: usize = 24;
 /// rounded up, or one level more where a node was filled unevenly; there are fewer than 2³² of them.
 pub(super) const MAX_DEPTH: usize = SAH_DEPTH + 24;
 
-/// Bins an axis, at most.
+/// Bins an axis, at most, and of small parts.
 const BINS: usize = 32;
+const FEW_BINS: usize = 8;
+
+/// Primitives that decide where a box is split: of more than these, a sample. That tells where to split as
+/// well, and saves reading them all once more for each of the upper levels of the tree.
+const SAMPLE: usize = 1 << 13;
+
+/// 2³² times the golden ratio: its multiples are spread evenly.
+const GOLDEN: u32 = 2_654_435_769;
 
 /// Primitives from which on a box is split by several threads, and those of a piece of that work.
 const PARALLEL: usize = 1 << 15;
@@ -30,21 +39,36 @@ const CHUNK: usize = 1 << 13;
 /// Primitives from which on children are built by several threads.
 const TASK: usize = 1 << 12;
 
-/// The box of a primitive. In the fourth places: its number, and whether it is an item.
+/// The box of a primitive. In the fourth places: its number, and its [`Kind`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reference {
     lower: Vec4,
     upper: Vec4,
 }
 
+/// What a box is around.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Triangle,
+    Sphere,
+    /// What is solved by itself.
+    Item,
+}
+
+/// Where triangles and spheres are, by number.
+pub(super) trait Primitives: Sync {
+    fn corners(&self, id: u32) -> [Vec3; 3];
+    fn sphere(&self, id: u32) -> Sphere;
+}
+
 impl Reference {
     pub(super) fn triangle(id: u32, [a, b, c]: [Vec3; 3]) -> Self {
-        let (lower, upper) = (a.min(b).min(c), a.max(b).max(c));
-        Self { lower: lower.extend(f32::from_bits(id)), upper: upper.extend(0.0) }
+        Self::new(Kind::Triangle, id, a.min(b).min(c), a.max(b).max(c))
     }
 
-    pub(super) fn item(index: u32, lower: Vec3, upper: Vec3) -> Self {
-        Self { lower: lower.extend(f32::from_bits(index)), upper: upper.extend(1.0) }
+    /// By the number of a primitive, or of an item.
+    pub(super) fn new(kind: Kind, id: u32, lower: Vec3, upper: Vec3) -> Self {
+        Self { lower: lower.extend(f32::from_bits(id)), upper: upper.extend(kind as u8 as f32) }
     }
 
     /// Whether all its numbers are.
@@ -58,8 +82,12 @@ impl Reference {
     }
 
     #[inline]
-    fn is_item(&self) -> bool {
-        self.upper.w == 1.0
+    fn kind(&self) -> Kind {
+        match self.upper.w {
+            0.0 => Kind::Triangle,
+            1.0 => Kind::Sphere,
+            _ => Kind::Item,
+        }
     }
 
     /// Twice its centre.
@@ -112,22 +140,25 @@ struct Part<'a> {
 #[derive(Default)]
 struct Subtree {
     nodes: Vec<Node>,
+    /// Of triangles.
     leaves: Vec<Leaf>,
+    /// Of spheres.
+    balls: Vec<Leaf>,
 }
 
-/// Where the triangles of a leaf are among all primitives.
+/// Where the primitives of a leaf are among all.
 #[derive(Clone, Copy)]
 struct Leaf {
     start: u32,
     len: u32,
 }
 
-/// Builds the tree over `refs`. `bins` bounds the effort, and `corners` tells those of a triangle.
+/// Builds the tree over `refs`. `bins` bounds the effort.
 pub(super) fn build(
     mut refs: Vec<Reference>,
     endless: Vec<u32>,
     bins: usize,
-    corners: impl Fn(u32) -> [Vec3; 3] + Sync,
+    primitives: &impl Primitives,
     watch: &Watch,
 ) -> Result<Tree, AccelError> {
     if refs.is_empty() {
@@ -136,19 +167,24 @@ pub(super) fn build(
     let refs_bytes = size_of_val(&refs[..]) as u64;
     let whole = Part::new(&mut refs, 0);
     let builder = Builder { bins: bins.clamp(4, BINS), watch };
-    let Subtree { nodes, leaves } = builder.subtree(whole, 0);
+    let Subtree { nodes, leaves, balls } = builder.subtree(whole, 0);
     watch.check()?;
     let bytes = size_of_val(&nodes[..])
         + size_of_val(&leaves[..])
-        + leaves.len() * size_of::<TriangleBlock>();
+        + size_of_val(&balls[..])
+        + leaves.len() * size_of::<TriangleBlock>()
+        + balls.len() * size_of::<SphereBlock>();
     watch.reserve(refs_bytes + bytes as u64)?;
-    let block = |leaf: &Leaf| {
+    // Places that are left over repeat the last.
+    let ids = |leaf: &Leaf| -> [u32; WIDTH] {
         let refs = &refs[leaf.start as usize..][..leaf.len as usize];
-        let mut block = TriangleBlock { corners: [[[0.0; WIDTH]; 3]; 3], ids: [0; WIDTH] };
-        for lane in 0..WIDTH {
-            let id = refs[lane.min(refs.len() - 1)].id();
-            block.ids[lane] = id;
-            for (corner, p) in corners(id).into_iter().enumerate() {
+        std::array::from_fn(|lane| refs[lane.min(refs.len() - 1)].id())
+    };
+    let triangles = |leaf: &Leaf| {
+        let ids = ids(leaf);
+        let mut block = TriangleBlock { corners: [[[0.0; WIDTH]; 3]; 3], ids };
+        for (lane, id) in ids.into_iter().enumerate() {
+            for (corner, p) in primitives.corners(id).into_iter().enumerate() {
                 for axis in 0..3 {
                     block.corners[axis][corner][lane] = p[axis];
                 }
@@ -156,8 +192,13 @@ pub(super) fn build(
         }
         block
     };
-    let blocks: Vec<TriangleBlock> = leaves.par_iter().with_min_len(512).map(block).collect();
-    Ok(Tree { nodes, blocks, endless })
+    let spheres = |leaf: &Leaf| {
+        let ids = ids(leaf);
+        SphereBlock::new(leaf.len as usize, ids.map(|id| primitives.sphere(id)), ids)
+    };
+    let blocks = leaves.par_iter().with_min_len(512).map(triangles).collect();
+    let spheres = balls.par_iter().with_min_len(512).map(spheres).collect();
+    Ok(Tree { nodes, blocks, spheres, endless })
 }
 
 impl<'a> Part<'a> {
@@ -177,8 +218,12 @@ impl<'a> Part<'a> {
 
     /// Whether one leaf can hold it.
     fn is_leaf(&self) -> bool {
-        self.refs.len() == 1
-            || (self.refs.len() <= WIDTH && !self.refs.iter().any(Reference::is_item))
+        let (first, rest) = self.refs.split_first().expect("no part is empty");
+        let kind = first.kind();
+        rest.is_empty()
+            || (self.refs.len() <= WIDTH
+                && kind != Kind::Item
+                && rest.iter().all(|r| r.kind() == kind))
     }
 }
 
@@ -241,11 +286,17 @@ impl Builder<'_> {
             self.append(tree, part, depth + 1);
             return Child::node(index);
         }
-        match &*part.refs {
-            [item] if item.is_item() => Child::item(item.id()),
-            triangles => {
-                tree.leaves.push(Leaf { start: part.start as u32, len: triangles.len() as u32 });
+        let first = part.refs[0];
+        let leaf = Leaf { start: part.start as u32, len: part.refs.len() as u32 };
+        match first.kind() {
+            Kind::Item => Child::item(first.id()),
+            Kind::Triangle => {
+                tree.leaves.push(leaf);
                 Child::triangles(tree.leaves.len() - 1)
+            }
+            Kind::Sphere => {
+                tree.balls.push(leaf);
+                Child::spheres(tree.balls.len() - 1)
             }
         }
     }
@@ -277,60 +328,69 @@ impl Builder<'_> {
     }
 
     /// The best split between bins, if the centres differ at all.
-    #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
     fn best_split(&self, part: &Part) -> Option<Split> {
-        let n = part.refs.len();
-        // As Embree has it: fewer bins for fewer primitives.
-        let bins = self.bins.min(4 + n / 16);
-        let extent = part.centers.upper - part.centers.lower;
-        let scale = |d: f32| if d > 0.0 { (bins - 1) as f32 / d } else { 0.0 };
-        let map = BinMap {
-            lower: part.centers.lower,
-            scale: Vec4::new(scale(extent.x), scale(extent.y), scale(extent.z), 0.0),
-        };
-        let add = |mut counted: Bins, refs: &[Reference]| {
-            refs.iter().for_each(|r| counted.add(&map, r));
-            counted
-        };
-        let counted = if n < PARALLEL {
-            add(Bins::EMPTY, part.refs)
-        } else {
-            let chunks = part.refs.par_chunks(CHUNK);
-            chunks.fold(|| Bins::EMPTY, add).reduce(|| Bins::EMPTY, Bins::union)
-        };
-        let mut best: Option<(f32, usize, usize)> = None;
-        for axis in 0..3 {
-            // Areas and numbers to the right of each boundary, then those to the left.
-            let mut right = [0.0; BINS];
-            let (mut bounds, mut count) = (Box4::EMPTY, 0);
-            for i in (1..bins).rev() {
-                bounds = bounds.union(counted.bounds[axis][i]);
-                count += counted.counts[axis][i];
-                right[i] = if count == 0 { f32::INFINITY } else { bounds.area() * blocks(count) };
+        // As Embree has it: fewer bins for fewer primitives. Most parts are small, and clearing bins that
+        // they do not use would take longer than all else.
+        match self.bins.min(4 + part.refs.len() / 16) {
+            bins @ ..=FEW_BINS => best_of::<FEW_BINS>(part, bins),
+            bins => best_of::<BINS>(part, bins),
+        }
+    }
+}
+
+/// The best split between so many bins, of `N` that there are.
+#[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
+fn best_of<const N: usize>(part: &Part, bins: usize) -> Option<Split> {
+    let n = part.refs.len();
+    let extent = part.centers.upper - part.centers.lower;
+    let scale = |d: f32| if d > 0.0 { (bins - 1) as f32 / d } else { 0.0 };
+    let map = BinMap {
+        lower: part.centers.lower,
+        scale: Vec4::new(scale(extent.x), scale(extent.y), scale(extent.z), 0.0),
+    };
+    let mut counted = Bins::<N>::EMPTY;
+    if n <= SAMPLE {
+        part.refs.iter().for_each(|r| counted.add(&map, r));
+    } else {
+        // From each of so many stretches of them one, and not always the same: meshes may be regular.
+        for i in 0..SAMPLE {
+            let [from, to] = [i, i + 1].map(|i| i * n / SAMPLE);
+            let turn = u64::from((i as u32).wrapping_mul(GOLDEN));
+            let within = (turn * (to - from) as u64 >> 32) as usize;
+            counted.add(&map, &part.refs[from + within]);
+        }
+    }
+    let mut best: Option<(f32, usize, usize)> = None;
+    for axis in 0..3 {
+        // Areas and numbers to the right of each boundary, then those to the left.
+        let mut right = [0.0; N];
+        let (mut bounds, mut count) = (Box4::EMPTY, 0);
+        for i in (1..bins).rev() {
+            bounds = bounds.union(counted.bounds[axis][i]);
+            count += counted.counts[axis][i];
+            right[i] = if count == 0 { f32::INFINITY } else { bounds.area() * blocks(count) };
+        }
+        let (mut bounds, mut count) = (Box4::EMPTY, 0);
+        for i in 1..bins {
+            bounds = bounds.union(counted.bounds[axis][i - 1]);
+            count += counted.counts[axis][i - 1];
+            if count == 0 {
+                continue;
             }
-            let (mut bounds, mut count) = (Box4::EMPTY, 0);
-            for i in 1..bins {
-                bounds = bounds.union(counted.bounds[axis][i - 1]);
-                count += counted.counts[axis][i - 1];
-                if count == 0 {
-                    continue;
-                }
-                let cost = bounds.area() * blocks(count) + right[i];
-                if cost < best.map_or(f32::INFINITY, |b| b.0) {
-                    best = Some((cost, axis, i));
-                }
+            let cost = bounds.area() * blocks(count) + right[i];
+            if cost < best.map_or(f32::INFINITY, |b| b.0) {
+                best = Some((cost, axis, i));
             }
         }
-        best.map(|(_, axis, bin)| Split { map, axis, bin: bin as u32 })
     }
+    best.map(|(_, axis, bin)| Split { map, axis, bin: bin as u32 })
 }
 
 /// The cost of a number of primitives: it goes by blocks.
 #[inline(always)]
 fn blocks(count: u32) -> f32 {
-    count.div_ceil(BLOCK) as f32
+    count.div_ceil(WIDTH as u32) as f32
 }
-const BLOCK: u32 = 4;
 
 fn set(node: &mut Node, lane: usize, bounds: &Box4, child: Child) {
     let corner = |p: Vec4| p.truncate().to_array();
@@ -344,6 +404,7 @@ impl Subtree {
         match child.content() {
             Content::Node(i) => Child::node(i + self.nodes.len()),
             Content::Triangles(i) => Child::triangles(i + self.leaves.len()),
+            Content::Spheres(i) => Child::spheres(i + self.balls.len()),
             Content::Item(_) => child,
         }
     }
@@ -358,6 +419,7 @@ impl Subtree {
         }
         self.nodes.append(&mut other.nodes);
         self.leaves.append(&mut other.leaves);
+        self.balls.append(&mut other.balls);
     }
 }
 
@@ -377,30 +439,21 @@ impl BinMap {
     }
 }
 
-struct Bins {
-    bounds: [[Box4; BINS]; 3],
-    counts: [[u32; BINS]; 3],
+struct Bins<const N: usize> {
+    bounds: [[Box4; N]; 3],
+    counts: [[u32; N]; 3],
 }
 
-impl Bins {
-    const EMPTY: Self = Self { bounds: [[Box4::EMPTY; BINS]; 3], counts: [[0; BINS]; 3] };
+impl<const N: usize> Bins<N> {
+    const EMPTY: Self = Self { bounds: [[Box4::EMPTY; N]; 3], counts: [[0; N]; 3] };
 
     #[inline(always)]
     fn add(&mut self, map: &BinMap, r: &Reference) {
         for (axis, bin) in map.bins(r).into_iter().enumerate() {
-            self.bounds[axis][bin as usize].add(r.lower, r.upper);
-            self.counts[axis][bin as usize] += 1;
+            let bin = bin as usize % N;
+            self.bounds[axis][bin].add(r.lower, r.upper);
+            self.counts[axis][bin] += 1;
         }
-    }
-
-    fn union(mut self, other: Self) -> Self {
-        for axis in 0..3 {
-            for i in 0..BINS {
-                self.bounds[axis][i] = self.bounds[axis][i].union(other.bounds[axis][i]);
-                self.counts[axis][i] += other.counts[axis][i];
-            }
-        }
-        self
     }
 }
 

@@ -3,18 +3,18 @@
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::super::AccelError;
 use super::super::world::{CopyRef, Geometry, Group, World, affine_from_rows};
-use super::super::{AccelError, Hit};
-use super::build::{Reference, build};
+use super::build::{Kind, Primitives, Reference, build};
 use super::node::{Child, Tree};
 use super::simd::{Kernel, Simd};
 use super::traverse::{Found, Items, any, closest};
 use super::watch::Watch;
-use crate::geometry::{AnalyticShape, with_shapes};
+use crate::geometry::{AnalyticShape, Shapes, Sphere, with_shapes};
 use crate::math::{Bounds, Ray};
 
 /// A group and the tree over it. Primitives are numbered through all its geometries; items are shapes,
-/// numbered in the same way, and then copies.
+/// numbered in the same way (spheres among them, though few are: most stand in blocks), and then copies.
 #[derive(Debug)]
 pub(super) struct GroupTree {
     pub(super) tree: Tree,
@@ -64,12 +64,12 @@ impl GroupTree {
 
         let mut refs = Vec::with_capacity(primitives + copies.len());
         let mut endless = Vec::new();
-        let mut add = |item: u32, bounds: &Bounds| {
+        let mut add = |kind: Kind, id: u32, item: u32, bounds: &Bounds| {
             if bounds.is_empty() {
                 return None;
             }
             let [lower, upper] = outer(bounds);
-            let reference = Reference::item(item, lower, upper);
+            let reference = Reference::new(kind, id, lower, upper);
             if !reference.is_finite() {
                 endless.push(item);
                 return None;
@@ -83,14 +83,26 @@ impl GroupTree {
                         Reference::triangle(first_primitives[i] + t as u32, mesh.corners(t))
                     }))
                 }
+                Geometry::Shapes(Shapes::Spheres(list)) => {
+                    let spheres = (first_primitives[i]..).zip(first_items[i]..).zip(list.iter());
+                    refs.extend(spheres.filter_map(|((id, item), sphere)| {
+                        add(Kind::Sphere, id, item, &sphere.bounds())
+                    }));
+                }
                 Geometry::Shapes(shapes) => with_shapes!(shapes, list => {
                     let boxes = (first_items[i]..).zip(list.iter());
-                    refs.extend(boxes.filter_map(|(item, shape)| add(item, &shape.bounds())));
+                    refs.extend(boxes.filter_map(|(item, shape)| {
+                        add(Kind::Item, item, item, &shape.bounds())
+                    }));
                 }),
             }
         }
         let copy_items = first_items.last().copied().unwrap_or(0)..;
-        refs.extend(copy_items.zip(copies).filter_map(|(item, (_, bounds))| add(item, bounds)));
+        refs.extend(
+            copy_items
+                .zip(copies)
+                .filter_map(|(item, (_, bounds))| add(Kind::Item, item, item, bounds)),
+        );
         if !refs.par_iter().all(Reference::is_finite) {
             refs.retain(Reference::is_finite);
         }
@@ -102,11 +114,7 @@ impl GroupTree {
             first_primitives,
             first_items,
         };
-        let corners = |id: u32| match group.primitive(id) {
-            (Geometry::Mesh(mesh), _, index) => mesh.corners(index as usize),
-            (Geometry::Shapes(_), ..) => unreachable!("shapes are items"),
-        };
-        group.tree = build(refs, endless, bins, corners, watch)?;
+        group.tree = build(refs, endless, bins, &group, watch)?;
         Ok(group)
     }
 
@@ -145,6 +153,22 @@ impl GroupTree {
     #[inline]
     fn first_copy(&self) -> u32 {
         self.first_items[self.geometries.len()]
+    }
+}
+
+impl Primitives for GroupTree {
+    fn corners(&self, id: u32) -> [Vec3; 3] {
+        match self.primitive(id) {
+            (Geometry::Mesh(mesh), _, index) => mesh.corners(index as usize),
+            (Geometry::Shapes(_), ..) => unreachable!("a triangle is of a mesh"),
+        }
+    }
+
+    fn sphere(&self, id: u32) -> Sphere {
+        match self.primitive(id) {
+            (Geometry::Shapes(Shapes::Spheres(list)), _, index) => list[index as usize],
+            _ => unreachable!("a sphere is of a list of spheres"),
+        }
     }
 }
 
@@ -296,8 +320,7 @@ fn intersect_shape(group: &GroupTree, item: u32, ray: &Ray) -> Option<Found> {
     let hit = with_shapes!(shapes, list => {
         list[index as usize].intersect(o, d, ray.t_min.into(), ray.t_max.into())
     })?;
-    let id = group.first_primitives[geometry] + index;
-    Some(Found { t: hit.t as f32, u: Hit::u_of_part(hit.part), v: 0.0, id, copy: Found::NO_COPY })
+    Some(Found::shape(hit, group.first_primitives[geometry] + index))
 }
 
 #[inline(never)]

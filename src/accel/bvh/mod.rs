@@ -1,8 +1,8 @@
-//! Our own hierarchy behind the seam: eight boxes to a node, eight triangles to a leaf, each tested at
-//! once with the widest instructions that the processor has.
+//! Our own hierarchy behind the seam: eight boxes to a node, eight triangles or spheres to a leaf, each tested
+//! at once with the widest instructions that the processor has.
 //!
-//! It owns how the tree is built and traversed. Triangles are copied into leaves, in the order of lanes;
-//! shapes are solved by themselves, in f64.
+//! It owns how the tree is built and traversed. Triangles and spheres are copied into leaves, in the order of
+//! lanes; other shapes are solved by themselves, in f64, as are spheres that a ray may hit.
 
 mod build;
 mod group;
@@ -10,6 +10,7 @@ mod node;
 mod packet;
 mod ray;
 mod simd;
+mod sphere;
 #[cfg(test)]
 mod tests;
 mod traverse;

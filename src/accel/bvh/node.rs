@@ -1,6 +1,8 @@
 //! How the tree lies in memory.
 
-/// Children of a node, triangles of a leaf.
+use crate::geometry::Sphere;
+
+/// Children of a node, triangles or spheres of a leaf.
 pub(super) const WIDTH: usize = 8;
 
 /// The boxes of eight children side by side, and what is in them.
@@ -12,8 +14,8 @@ pub(super) struct Node {
     pub(super) children: [Child; WIDTH],
 }
 
-/// What is in a box: a node, a block of triangles, or an item that is solved by itself (a shape or a copy).
-/// The index of one of these, under two bits that tell which.
+/// What is in a box: a node, a block of triangles or of spheres, or an item that is solved by itself (another
+/// shape, or a copy). The index of one of these, under two bits that tell which.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(transparent)]
 pub(super) struct Child(pub(super) u32);
@@ -23,6 +25,7 @@ pub(super) struct Child(pub(super) u32);
 pub(super) enum Content {
     Node(usize),
     Triangles(usize),
+    Spheres(usize),
     Item(u32),
 }
 
@@ -31,6 +34,7 @@ impl Child {
     pub(super) const LIMIT: usize = 1 << 30;
     const TRIANGLES: u32 = 1 << 31;
     const ITEM: u32 = 1 << 30;
+    const SPHERES: u32 = Self::TRIANGLES | Self::ITEM;
     const INDEX: u32 = Self::ITEM - 1;
 
     pub(super) const fn node(index: usize) -> Self {
@@ -43,25 +47,24 @@ impl Child {
         Self(block as u32 | Self::TRIANGLES)
     }
 
+    pub(super) const fn spheres(block: usize) -> Self {
+        debug_assert!(block < Self::LIMIT);
+        Self(block as u32 | Self::SPHERES)
+    }
+
     pub(super) const fn item(index: u32) -> Self {
         debug_assert!((index as usize) < Self::LIMIT);
         Self(index | Self::ITEM)
     }
 
     #[inline(always)]
-    pub(super) const fn is_node(self) -> bool {
-        self.0 < Self::ITEM
-    }
-
-    #[inline(always)]
     pub(super) const fn content(self) -> Content {
         let index = self.0 & Self::INDEX;
-        if self.is_node() {
-            Content::Node(index as usize)
-        } else if self.0 & Self::TRIANGLES != 0 {
-            Content::Triangles(index as usize)
-        } else {
-            Content::Item(index)
+        match self.0 & Self::SPHERES {
+            0 => Content::Node(index as usize),
+            Self::TRIANGLES => Content::Triangles(index as usize),
+            Self::SPHERES => Content::Spheres(index as usize),
+            _ => Content::Item(index),
         }
     }
 }
@@ -96,12 +99,25 @@ pub(super) struct TriangleBlock {
     pub(super) ids: [u32; WIDTH],
 }
 
+/// Up to eight spheres side by side.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct SphereBlock {
+    /// Centres by axis, rounded, and radii that cover for that. Places without a sphere are far off.
+    pub(super) rounded: [[f32; WIDTH]; 4],
+    /// They repeat one that is there.
+    pub(super) spheres: [Sphere; WIDTH],
+    /// Numbers of the primitives in their tree.
+    pub(super) ids: [u32; WIDTH],
+}
+
 /// A hierarchy over the primitives of one group.
 #[derive(Debug, Default)]
 pub(super) struct Tree {
     /// The first is the root; none where there is nothing in it.
     pub(super) nodes: Vec<Node>,
     pub(super) blocks: Vec<TriangleBlock>,
+    pub(super) spheres: Vec<SphereBlock>,
     /// Items without end, which every ray is tested against.
     pub(super) endless: Vec<u32>,
 }
@@ -111,6 +127,7 @@ impl Tree {
     pub(super) fn bytes(&self) -> u64 {
         let bytes = self.nodes.len() * size_of::<Node>()
             + self.blocks.len() * size_of::<TriangleBlock>()
+            + self.spheres.len() * size_of::<SphereBlock>()
             + self.endless.len() * size_of::<u32>();
         bytes as u64
     }

@@ -8,10 +8,9 @@
 
 use super::super::block::{LANES, RayBlock, lanes_of, lanes_where};
 use super::node::{Content, Node, Tree, WIDTH};
-use super::ray::RaySetup;
+use super::ray::{RaySetup, ShearRay};
 use super::simd::{Floats, Simd, Stack};
 use super::traverse::{Found, Items, STACK, ask};
-use super::triangle::ShearRay;
 
 /// The rays of a block whose directions have the same signs: the fields of [`RaySetup`], a lane each.
 pub(super) struct Packet {
@@ -101,7 +100,7 @@ impl Packet {
         Some(packet)
     }
 
-    /// The ray of a lane, for triangles.
+    /// The ray of a lane, for triangles and spheres.
     #[inline(always)]
     fn shear_ray<S: Simd>(&self, simd: S, lane: usize) -> ShearRay<S::F8> {
         let of = |lanes: &[[f32; LANES]; 3]| [lanes[0][lane], lanes[1][lane], lanes[2][lane]];
@@ -270,6 +269,10 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
                         false
                     });
                 }
+                Content::Spheres(index) => {
+                    let shear = packet.shear_ray(simd, lane);
+                    shear.closest_sphere(simd, &tree.spheres[index], &block.get(lane), best);
+                }
                 Content::Item(item) => ask(simd, items, item, &block.get(lane), best),
             }
             packet.t_max[lane] = best.t;
@@ -312,6 +315,11 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
                         is_hit = !(OPAQUE && items.is_clear(triangles.ids[i]));
                         is_hit
                     });
+                }
+                Content::Spheres(index) => {
+                    let counts = |id| !(OPAQUE && items.is_clear(id));
+                    let (shear, spheres) = (packet.shear_ray(simd, lane), &tree.spheres[index]);
+                    is_hit = shear.meets_sphere(simd, spheres, &block.get(lane), counts);
                 }
                 Content::Item(item) => {
                     is_hit = items.occluded::<S, OPAQUE>(simd, item, &block.get(lane));

@@ -183,3 +183,54 @@ impl<F: Floats> SlabRay<F> {
         times
     }
 }
+
+/// The ray in every lane, against eight triangles or spheres: they are seen from its origin, and sheared so
+/// that it runs along an axis.
+#[derive(Clone, Copy)]
+pub(super) struct ShearRay<F> {
+    /// In the order of `axes`, of which the direction is longest along the last.
+    pub(super) origin: [F; 3],
+    pub(super) shear: [F; 2],
+    pub(super) axes: [usize; 3],
+    /// Length along the last axis to distance.
+    pub(super) along: f32,
+    pub(super) t_min: f32,
+}
+
+impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
+    #[inline(always)]
+    pub(super) fn new<S: Simd<F8 = F>>(simd: S, ray: &RaySetup) -> Self {
+        Self::of(simd, ray.origin, ray.shear, ray.last, ray.t_min)
+    }
+
+    /// By the parts of a [`RaySetup`].
+    #[inline(always)]
+    pub(super) fn of<S: Simd<F8 = F>>(
+        simd: S,
+        origin: [f32; 3],
+        [x, y, along]: [f32; 3],
+        last: u32,
+        t_min: f32,
+    ) -> Self {
+        Self {
+            origin: turned(origin, last).map(|o| simd.splat8(o)),
+            shear: [simd.splat8(x), simd.splat8(y)],
+            axes: turned([0, 1, 2], last),
+            along,
+            t_min,
+        }
+    }
+
+    /// Points as seen from the origin. They are given by coordinate, in the order of `axes`.
+    #[inline(always)]
+    pub(super) fn seen<S: Simd<F8 = F>>(&self, simd: S, points: [&[f32; 8]; 3]) -> [F; 3] {
+        let [x, y, z] = points.map(|p| simd.load8(p));
+        [x.sub(self.origin[0]), y.sub(self.origin[1]), z.sub(self.origin[2])]
+    }
+
+    /// Such points, sheared.
+    #[inline(always)]
+    pub(super) fn sheared<S: Simd<F8 = F>>(&self, _simd: S, [x, y, z]: [F; 3]) -> [F; 3] {
+        [self.shear[0].neg_mul_add(z, x), self.shear[1].neg_mul_add(z, y), z]
+    }
+}

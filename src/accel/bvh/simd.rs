@@ -26,6 +26,7 @@ pub(super) trait Floats: Copy {
     fn neg_mul_add(self, b: Self, c: Self) -> Self;
     fn min(self, b: Self) -> Self;
     fn max(self, b: Self) -> Self;
+    fn sqrt(self) -> Self;
     /// In which lanes `self ≤ b`, as bits; not in those with NaN.
     fn le(self, b: Self) -> u32;
 }
@@ -165,6 +166,11 @@ impl<const N: usize> Floats for Lanes<N> {
     }
 
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+
+    #[inline(always)]
     fn le(self, b: Self) -> u32 {
         (0..N).fold(0, |bits, i| bits | u32::from(self.0[i] <= b.0[i]) << i)
     }
@@ -259,6 +265,11 @@ impl<F: Floats<Array = [f32; 8]>> Floats for Pair<F> {
     }
 
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt(), self.1.sqrt())
+    }
+
+    #[inline(always)]
     fn le(self, b: Self) -> u32 {
         self.0.le(b.0) | self.1.le(b.1) << 8
     }
@@ -307,7 +318,7 @@ mod x86 {
     macro_rules! lanes {
         ($name:ident($register:ty) of $n:literal, $proof:literal: $store:ident, $add:ident, $sub:ident,
          $mul:ident, $div:ident, $mul_add:ident, $mul_sub:ident, $neg_mul_add:ident, $min:ident, $max:ident,
-         |$a:ident, $b:ident| $le:expr) => {
+         $sqrt:ident, |$a:ident, $b:ident| $le:expr) => {
             #[doc = concat!("Lanes of ", $proof, ", made by its methods alone.")]
             #[derive(Debug, Clone, Copy)]
             pub(in super::super) struct $name($register);
@@ -325,6 +336,12 @@ mod x86 {
 
                 lanes!(@binary add $add, sub $sub, mul $mul, div $div, min $min, max $max);
                 lanes!(@ternary mul_add $mul_add, mul_sub $mul_sub, neg_mul_add $neg_mul_add);
+
+                #[inline(always)]
+                fn sqrt(self) -> Self {
+                    // SAFETY: `self` proves the instruction set.
+                    Self(unsafe { $sqrt(self.0) })
+                }
 
                 #[inline(always)]
                 fn le(self, b: Self) -> u32 {
@@ -352,11 +369,11 @@ mod x86 {
 
     lanes!(Avx8(__m256) of 8, "[`Avx2`]": _mm256_storeu_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps,
         _mm256_div_ps, _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_fnmadd_ps, _mm256_min_ps, _mm256_max_ps,
-        |a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32);
+        _mm256_sqrt_ps, |a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32);
 
     lanes!(Avx16(__m512) of 16, "[`Avx512`]": _mm512_storeu_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps,
         _mm512_div_ps, _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_min_ps, _mm512_max_ps,
-        |a, b| u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)));
+        _mm512_sqrt_ps, |a, b| u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)));
 
     impl Simd for Avx2 {
         type F8 = Avx8;

@@ -8,10 +8,10 @@ use super::node::Child;
 use super::simd::{Avx2, Avx512};
 use super::simd::{Floats, Isa, Portable, Simd};
 use crate::accel::{
-    AccelError, BruteForce, BuildOptions, Geometry, Group, InstanceSet, Precision, RayQuery, World,
-    rows_from_affine,
+    AccelError, BruteForce, BuildOptions, Geometry, Group, Hit, InstanceSet, Precision, RayQuery,
+    World, rows_from_affine,
 };
-use crate::geometry::{Plane, TriangleMesh};
+use crate::geometry::{Plane, Sphere, TriangleMesh};
 use crate::math::Ray;
 
 fn numbers(seed: u32) -> impl FnMut() -> f32 {
@@ -214,6 +214,79 @@ fn trees_stay_shallow() {
     assert!(depth(&accel.root.tree.nodes, Child::node(0)) <= super::build::MAX_DEPTH);
     let hit = accel.intersect(&Ray::new(Vec3::new(0.1, 0.1, 1.0), Vec3::NEG_Z)).unwrap();
     assert!((hit.t - 1.0).abs() < 1e-6);
+}
+
+/// Spheres are the oracle's to the last bit, as it solves them by the same arithmetic: what finds them side by
+/// side loses none. At any scale, seen from far away, from inside and from the surface, grazing half of the
+/// time, whatever the length of the direction.
+#[test]
+fn spheres_are_the_oracles() {
+    for (scale, offset) in
+        [(1.0, 0.0), (1e-9, 0.0), (1e11, 0.0), (1.0, 1e3), (1e-3, 1e4), (1e-2, 1e6)]
+    {
+        let mut next = numbers(11);
+        let mut random = || f64::from(next());
+        let spheres: Vec<Sphere> = (0..300)
+            .map(|i| {
+                let center = DVec3::new(random(), random(), random()) * scale + offset;
+                let radius = if i % 50 == 0 { 0.3 } else { 0.05 * random().abs().powi(3) + 1e-4 };
+                Sphere { center, radius: radius * scale }
+            })
+            .collect();
+        let [clear, opaque] =
+            [0, 150].map(|i| Geometry::Shapes(spheres[i..i + 150].to_vec().into()));
+        let root = Group { geometries: vec![clear, opaque], clear: vec![true, false] };
+        let world = World { root, ..World::default() };
+        let oracle = BruteForce::new(&world);
+        let rays: Vec<Ray> = (0..4000)
+            .map(|i| {
+                let sphere = &spheres[i % spheres.len()];
+                let n = DVec3::new(random(), random(), random()).normalize();
+                let aside = n.any_orthonormal_vector();
+                let distance = [0.0, 0.5, 1.0, 3.0, 1e2, 1e5][i % 6];
+                let origin = sphere.center + n * (sphere.radius * distance);
+                // Half of them past the rim, by a little more or less than f32 can tell.
+                let rim = 1.0 + 1e-6 * random();
+                let aim = if i % 2 == 0 { rim } else { random() };
+                let target = sphere.center + aside * (sphere.radius * aim);
+                let length = [1.0, 1e-9, 1e9][i % 3];
+                let d = (target - origin).normalize_or(aside) * length;
+                let reach = if i % 7 == 0 { scale / length } else { f64::INFINITY };
+                Ray { t_max: reach as f32, ..Ray::new(origin.as_vec3(), d.as_vec3()) }
+            })
+            .collect();
+        for isa in [Some(Isa::Portable(Portable)), None] {
+            let accel = built(&world, isa, None);
+            let mut hits = 0;
+            for ray in &rays {
+                let expected = oracle.intersect(ray);
+                let hit = accel.intersect(ray);
+                assert_eq!(hit, expected, "{scale} {offset}: {ray:?}");
+                assert_eq!(accel.occluded(ray), expected.is_some(), "{scale} {offset}: {ray:?}");
+                let opaque = (accel.occluded_by_opaque(ray), oracle.occluded_by_opaque(ray));
+                assert_eq!(opaque.0, opaque.1, "{scale} {offset}: {ray:?}");
+                hits += usize::from(hit.is_some());
+            }
+            assert!(hits > 300, "{scale} {offset}: {hits} of {}", rays.len());
+        }
+    }
+}
+
+/// Spheres among triangles get leaves of their own, and one that fits no box of f32 is met all the same.
+#[test]
+fn spheres_stand_beside_triangles() {
+    let sphere = |radius: f64| Sphere { center: DVec3::new(0.0, 1.0, 0.0), radius };
+    let spheres = Geometry::Shapes(vec![sphere(0.25), sphere(1e39)].into());
+    let mesh = Geometry::Mesh(field(2, 1.0, Vec3::ZERO));
+    let root = Group { geometries: vec![mesh, spheres], ..Group::default() };
+    let accel = built(&World { root, ..World::default() }, None, None);
+    let from = |y: f32, d: Vec3| accel.intersect(&Ray::new(Vec3::new(0.1, y, 0.1), d)).unwrap();
+    let ids = |hit: Hit| (hit.geometry, hit.primitive);
+    assert_eq!(ids(from(3.0, Vec3::NEG_Y)), (1, 0));
+    assert_eq!(from(0.5, Vec3::NEG_Y).geometry, 0);
+    // Beyond the largest f32, but not of f64.
+    let out = accel.intersect(&Ray::new(Vec3::new(5.0, 1.0, 0.0), Vec3::X * 1e3)).unwrap();
+    assert_eq!(ids(out), (1, 1));
 }
 
 /// Planes without end, in the root and in a copy, in front of and behind a mesh.

@@ -2,9 +2,11 @@
 
 use super::build::MAX_DEPTH;
 use super::node::{Child, Content, Node, Tree, WIDTH};
-use super::ray::{RaySetup, SlabRay};
+use super::ray::{RaySetup, ShearRay, SlabRay};
 use super::simd::{Floats, Simd, Stack};
-use super::triangle::{ShearRay, TriangleHit};
+use super::triangle::TriangleHit;
+use crate::accel::Hit;
+use crate::geometry::ShapeHit;
 use crate::math::Ray;
 
 /// Every level leaves seven children to come back to.
@@ -34,6 +36,13 @@ impl Found {
     #[inline(always)]
     pub(super) const fn triangle(hit: TriangleHit, id: u32) -> Self {
         Self { t: hit.t, u: hit.u, v: hit.v, id, copy: Self::NO_COPY }
+    }
+
+    /// A sphere, or another shape.
+    #[inline(always)]
+    pub(super) const fn shape(hit: ShapeHit, id: u32) -> Self {
+        let (t, u) = (hit.t as f32, Hit::u_of_part(hit.part));
+        Self { t, u, v: 0.0, id, copy: Self::NO_COPY }
     }
 
     #[inline(always)]
@@ -118,6 +127,10 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
                     }
                     false
                 });
+                t_far = simd.splat8(best.t);
+            }
+            Content::Spheres(index) => {
+                shear.closest_sphere(simd, &tree.spheres[index], ray, &mut best);
                 t_far = simd.splat8(best.t);
             }
             Content::Item(item) => {
@@ -240,6 +253,12 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
                     is_hit
                 });
                 if is_hit {
+                    return true;
+                }
+            }
+            Content::Spheres(index) => {
+                let counts = |id| !(OPAQUE && items.is_clear(id));
+                if shear.meets_sphere(simd, &tree.spheres[index], ray, counts) {
                     return true;
                 }
             }

@@ -8,20 +8,8 @@
 //! inside: a ray that meets a closed mesh at an edge or a vertex hits at least one triangle there.
 
 use super::node::TriangleBlock;
-use super::ray::{RaySetup, turned};
+use super::ray::ShearRay;
 use super::simd::{Floats, Simd};
-
-/// The ray in every lane, against eight triangles.
-#[derive(Clone, Copy)]
-pub(super) struct ShearRay<F> {
-    /// In the order of `axes`, of which the direction is longest along the last.
-    origin: [F; 3],
-    shear: [F; 2],
-    axes: [usize; 3],
-    /// Length along the last axis to distance.
-    along: f32,
-    t_min: f32,
-}
 
 /// Where one triangle is hit.
 #[derive(Debug, Clone, Copy)]
@@ -44,54 +32,15 @@ struct Candidates<F> {
 
 impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
     #[inline(always)]
-    pub(super) fn new<S: Simd<F8 = F>>(simd: S, ray: &RaySetup) -> Self {
-        Self::of(simd, ray.origin, ray.shear, ray.last, ray.t_min)
-    }
-
-    /// By the parts of a [`RaySetup`].
-    #[inline(always)]
-    pub(super) fn of<S: Simd<F8 = F>>(
-        simd: S,
-        origin: [f32; 3],
-        [x, y, along]: [f32; 3],
-        last: u32,
-        t_min: f32,
-    ) -> Self {
-        Self {
-            origin: turned(origin, last).map(|o| simd.splat8(o)),
-            shear: [simd.splat8(x), simd.splat8(y)],
-            axes: turned([0, 1, 2], last),
-            along,
-            t_min,
-        }
-    }
-
-    /// Corners as the ray sees them.
-    #[inline(always)]
-    fn sheared<S: Simd<F8 = F>>(
-        &self,
-        simd: S,
-        [xs, ys, zs]: [&[[f32; 8]; 3]; 3],
-        i: usize,
-    ) -> [F; 3] {
-        let x = simd.load8(&xs[i]).sub(self.origin[0]);
-        let y = simd.load8(&ys[i]).sub(self.origin[1]);
-        let z = simd.load8(&zs[i]).sub(self.origin[2]);
-        [self.shear[0].neg_mul_add(z, x), self.shear[1].neg_mul_add(z, y), z]
-    }
-
-    #[inline(always)]
     fn candidates<S: Simd<F8 = F>, const ROBUST: bool>(
         &self,
         simd: S,
         block: &TriangleBlock,
     ) -> Candidates<F> {
-        let [kx, ky, kz] = self.axes;
-        let (xs, ys, zs) = (&block.corners[kx], &block.corners[ky], &block.corners[kz]);
-        let corners = [xs, ys, zs];
-        let [ax, ay, az] = self.sheared(simd, corners, 0);
-        let [bx, by, bz] = self.sheared(simd, corners, 1);
-        let [cx, cy, cz] = self.sheared(simd, corners, 2);
+        let [xs, ys, zs] = self.axes.map(|axis| &block.corners[axis]);
+        let [ax, ay, az] = self.sheared(simd, self.seen(simd, [&xs[0], &ys[0], &zs[0]]));
+        let [bx, by, bz] = self.sheared(simd, self.seen(simd, [&xs[1], &ys[1], &zs[1]]));
+        let [cx, cy, cz] = self.sheared(simd, self.seen(simd, [&xs[2], &ys[2], &zs[2]]));
         let u = cross::<F, ROBUST>(cx, cy, bx, by);
         let v = cross::<F, ROBUST>(ax, ay, cx, cy);
         let w = cross::<F, ROBUST>(bx, by, ax, ay);

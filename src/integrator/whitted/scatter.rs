@@ -185,7 +185,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             return;
         }
         self.counts.refraction += 1;
-        let ray = self.scene.spawn(point, node.ray.direction, f32::INFINITY);
+        let ray = self.scene.spawn_on(point, node.ray.direction);
         let (passed, way) = (node.passed + 1, Way::Refracted);
         let cone = fork.cone.turned(0.0);
         let before = node.before + (point.position - node.ray.origin).length();
@@ -250,7 +250,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             Way::Mirrored => self.counts.reflection += 1,
             Way::Refracted => self.counts.refraction += 1,
         }
-        let ray = self.scene.spawn(fork.point, direction, f32::INFINITY);
+        let ray = self.scene.spawn_on(fork.point, direction);
         self.stack.push(Node {
             ray,
             throughput,
