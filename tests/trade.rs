@@ -134,6 +134,34 @@ fn what_is_recommended_for_an_error_reaches_it() {
     assert_eq!(kept.len(), 1);
 }
 
+/// The command that is told is all that there is to it: of a larger scene, with other fields and another
+/// accelerator, it renders the picture that was measured, and in about the time that was asked for.
+#[test]
+fn what_is_recommended_for_a_time_is_a_whole_command() {
+    let folder = folder();
+    let folder = folder.path();
+    // Four times as wide as is measured: were the size not told, it would take sixteen times as long.
+    std::fs::write(folder.join("scene.toml"), SCENE.replace("[64, 48]", "[1280, 960]")).unwrap();
+    let given = ["--accel", "bvh", "--set", "camera.fov=30", "--samples", "2"];
+    let start = ["--time", "1.5s", "--no-cache", "--reference-samples", "64"];
+    let all: Vec<&str> = start.into_iter().chain(given).collect();
+    let found = report(folder, &all);
+    let found = &found["recommendations"][0];
+    let flags = words(&found["flags"]);
+    for pair in [["--size", "320x240"], ["--accel", "bvh"], ["--set", "camera.fov=30"]] {
+        assert!(flags.windows(2).any(|words| words == pair), "{pair:?}: {flags:?}");
+    }
+    let start = ["render", "scene.toml", "-q", "-o", "this.exr", "--stats", "stats.json"];
+    let all: Vec<&str> = start.into_iter().chain(flags.iter().copied()).collect();
+    run(folder, &all);
+    let stats = std::fs::read_to_string(folder.join("stats.json")).unwrap();
+    let stats: Value = serde_json::from_str(&stats).unwrap();
+    let seconds = stats["seconds"]["total"].as_f64().unwrap();
+    // Machines are busy at times; sixteen times as long is no such time.
+    assert!(seconds < 6.0, "{seconds}: {flags:?}");
+    assert_eq!(read_picture(&folder.join("this.exr")).unwrap().extent, [320, 240]);
+}
+
 /// The relative error of a picture against another.
 fn error(picture: &Path, reference: &Path) -> f64 {
     let film = |path: &Path| {

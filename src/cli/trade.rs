@@ -6,16 +6,17 @@ use std::sync::Mutex;
 
 use serde::Serialize;
 
-use super::args::TradeArgs;
+use super::args::{SceneArgs, TradeArgs};
 use super::outputs::check_targets;
 use super::prepare::{load, thread_pool};
 use super::progress::{Progress, catch_interrupts, interrupted};
 use super::units::megabytes;
 use super::{Failure, Outcome, print, tell, warn};
+use crate::accel::AccelKind;
 use crate::film::{Film, Picture, PixelRect};
 use crate::io::{
-    Attribute, AttributeValue, ExrOptions, PixelType, png_bytes, read_attributes, read_picture,
-    write_exr, write_text,
+    Attribute, AttributeValue, ExrOptions, NonFinite, PixelType, png_bytes, read_attributes,
+    read_picture, write_exr, write_text,
 };
 use crate::measure::trade::{
     Choice, Point, Reference, Target, TradeError, TradeObserver, TradeOptions, TradeReport, html,
@@ -110,6 +111,7 @@ pub(super) fn trade(args: &TradeArgs) -> Result<Outcome, Failure> {
         targets: errors.chain(times).collect(),
         // As `render` keeps back for a picture of half floats.
         read_and_write: read + 0.02 + 1e-7 * f64::from(width) * f64::from(height),
+        given: given(args, [width, height]),
     };
     let report = pool.install(|| measure(&loaded.scene, &base, &reference, &options, &shown));
     shown.with(|progress| progress.finish());
@@ -143,6 +145,50 @@ pub(super) fn trade(args: &TradeArgs) -> Result<Outcome, Failure> {
         )));
     }
     Ok(Outcome::Done)
+}
+
+/// The flags of `render` that make what is measured, of pictures of `size`, of the scene's file.
+fn given(args: &TradeArgs, [width, height]: [u32; 2]) -> Vec<Vec<String>> {
+    // Whatever is added to these either shows in a picture or its time, or is left out by name.
+    let SceneArgs {
+        scene: _,
+        set,
+        camera,
+        size: _,
+        samples,
+        integrator,
+        max_depth,
+        precision,
+        build_quality,
+        filter,
+        threads,
+        compact,
+        non_finite,
+        memory_limit,
+        quiet: _,
+    } = &args.scene;
+    let mut given = Vec::new();
+    let mut say = |name: &str, value: Option<String>| {
+        given.extend(value.map(|value| vec![format!("--{name}"), value]));
+    };
+    set.iter().for_each(|field| say("set", Some(field.clone())));
+    say("camera", camera.clone());
+    say("size", Some(format!("{width}x{height}")));
+    say("samples", samples.map(|n| n.to_string()));
+    say("integrator", integrator.map(|kind| kind.name().to_owned()));
+    say("max-depth", max_depth.map(|n| n.to_string()));
+    say("precision", precision.map(|rung| rung.name().to_owned()));
+    say("build-quality", build_quality.map(|quality| quality.name().to_owned()));
+    say("filter", filter.map(|filter| filter.name().to_owned()));
+    say("threads", threads.map(|n| n.to_string()));
+    let is_said = *non_finite != NonFinite::ALL[0];
+    say("non-finite", is_said.then(|| non_finite.name().to_owned()));
+    say("memory-limit", memory_limit.map(|bytes| bytes.to_string()));
+    let kind = args.accel.kind;
+    say("accel", (kind != AccelKind::default()).then(|| kind.name().to_owned()));
+    let switches = [("compact", *compact), ("single-rays", args.accel.single_rays)];
+    given.extend(switches.iter().filter(|(_, is)| *is).map(|(name, _)| vec![format!("--{name}")]));
+    given
 }
 
 fn failure(error: TradeError) -> Failure {

@@ -531,7 +531,7 @@ fn self_hits(n: usize) -> Table {
     }
     Table {
         title: "Surfaces that hit themselves",
-        what: "Of a million rays that leave a convex shape outward, a quarter of them nearly grazing, those that hit it \
+        what: "Of each million rays that leave a convex shape outward, a quarter of them nearly grazing, those that hit it \
                again, at `robust`; by the rule that lets them leave: `epsilon = \"auto\"`, or fixed distances. Red: any \
                by `auto`.",
         columns: rules.iter().map(|rule| format!("`{rule}`")).collect(),
@@ -581,7 +581,7 @@ fn stacked(n: usize) -> Table {
     });
     Table {
         title: "Surfaces on each other",
-        what: "Of a million rays from a distance of about 1: those that miss both squares, and those that hit the farther \
+        what: "Of each million rays from a distance of about 1: those that miss both squares, and those that hit the farther \
                one, or, of two that coincide, another than the first ray did. Red: any lost, any wrong from 10⁻⁵ on.",
         columns: Rung::columns(),
         rows: rows.into(),
@@ -643,45 +643,69 @@ fn slivers(n: usize) -> Table {
     }
 }
 
-/// A pebble on a planet, both spheres of their own, and the ratio that one mesh holds.
+/// Of `n` rays from a metre (or a hundred radii, where that is more) away to a pebble that lies at `at` on a
+/// planet, how many are lost, and how far off a hit is at most, in radii of the pebble.
+fn pebble_seen(rung: Rung, planet: f64, radius: f64, at: DVec3, n: usize) -> [f64; 2] {
+    let mut desc = empty();
+    let pebble = at + DVec3::Y * radius;
+    desc.objects.push(sphere(at - DVec3::Y * planet, planet));
+    desc.objects.push(sphere(pebble, radius));
+    let eye = at + DVec3::new(0.0, 0.3, 1.0) * (100.0 * radius).max(1.0);
+    let fov = 2.0 * radius / (eye - pebble).length();
+    desc.camera = Some(look(eye, pebble, fov));
+    let scene = rung.scene(desc);
+    let query = scene.accel.query();
+    let mut random = Random(4);
+    let (mut lost, mut off) = (0.0, 0.0f64);
+    for _ in 0..n {
+        let (r, phi) = (0.85 * random.unit().sqrt(), TAU * random.unit());
+        let film = DVec2::new(32.0 + 29.0 * r * phi.cos(), 32.0 + 29.0 * r * phi.sin());
+        let Some(ray) = scene.camera.ray(film, [0.5, 0.5]) else { continue };
+        let (o, d) = scene.camera.ray_f64(film);
+        let Some(truth) = enter(o, d, pebble - scene.center, radius) else { continue };
+        match query.intersect(&ray) {
+            Some(hit) => {
+                let p = scene.surface(&ray, &hit).position.as_dvec3();
+                off = off.max((p - truth).length() / radius);
+            }
+            None => lost += 1.0,
+        }
+    }
+    [lost, off]
+}
+
+/// A pebble on a planet, and how small it may be where f32 does not tell its points apart.
 fn planet(n: usize) -> Table {
     let mut rows = Vec::new();
     for radius in [6.4e3, 6.4e6] {
         rows.push(row(format!("pebble of 1 cm on a planet of {} m", power(radius)), |rung| {
-            let mut desc = empty();
-            let pebble = DVec3::new(0.0, 0.01, 0.0);
-            desc.objects.push(sphere(DVec3::new(0.0, -radius, 0.0), radius));
-            desc.objects.push(sphere(pebble, 0.01));
-            desc.camera = Some(look(DVec3::new(0.0, 0.3, 1.0), pebble, 0.02));
-            let scene = rung.scene(desc);
-            let query = scene.accel.query();
-            let mut random = Random(4);
-            let (mut lost, mut off) = (0, 0.0f64);
             let n = n / 8;
-            for _ in 0..n {
-                let (r, phi) = (0.85 * random.unit().sqrt(), TAU * random.unit());
-                let film = DVec2::new(32.0 + 29.0 * r * phi.cos(), 32.0 + 29.0 * r * phi.sin());
-                let Some(ray) = scene.camera.ray(film, [0.5, 0.5]) else { continue };
-                let (o, d) = scene.camera.ray_f64(film);
-                let Some(truth) = enter(o, d, pebble - scene.center, 0.01) else { continue };
-                match query.intersect(&ray) {
-                    Some(hit) => {
-                        let p = scene.surface(&ray, &hit).position.as_dvec3();
-                        off = off.max((p - truth).length() / 0.01);
-                    }
-                    None => lost += 1,
-                }
-            }
-            let text = format!("{} lost, off {off:.0e} radii", per_million(lost, n));
-            Cell::new(text, rung.is_robust() && lost > 0)
+            let [lost, off] = pebble_seen(rung, radius, 0.01, DVec3::ZERO, n);
+            let text = format!("{} lost, off {off:.0e} radii", per_million(lost as usize, n));
+            Cell::new(text, rung.is_robust() && lost > 0.0)
         }));
     }
+    // Where f32 does not hold a pebble: the origin is elsewhere, and positions are rounded to the planet.
+    rows.push(row("the origin in the middle of the planet: smallest pebble", |rung| {
+        let planet = 6.4e6;
+        let holds = |power: i32| {
+            let pebble = planet * f64::exp2(f64::from(-power));
+            let [lost, off] = pebble_seen(rung, planet, pebble, DVec3::Y * planet, n / 64);
+            lost == 0.0 && off < 0.1
+        };
+        let power = (1..=40).take_while(|power| holds(*power)).last().unwrap_or(0);
+        let ratio = f64::exp2(f64::from(-power));
+        Cell::new(format!("{ratio:.0e} of it"), rung.is_robust() && power < 18)
+    }));
     Table {
         title: "Huge and tiny in one scene",
-        what: "A camera 1 m from the pebble: rays of a million that miss it, and by how much of its radius a hit is off. \
-               The world is recentred on the box of all things, so f32 positions near the pebble are rounded to 2⁻²⁴ of \
-               the planet's size; in one mesh the same holds of its vertices. Details are held down to some 10⁻⁶ of the \
-               largest extent. Red: a ray lost from `robust` on.",
+        what: "A camera 1 m from the pebble, both near the file's origin: of each million rays those that miss it, and by \
+               how much of its radius a hit is off. Red: a ray lost from `robust` on. There f32 has all its digits. \
+               Elsewhere positions are rounded to 2⁻²⁴ of their distance from the origin, or, in a scene that is moved, \
+               of its extent; the vertices of one mesh are rounded alike. The last row has the origin in the middle of the \
+               planet, where a pebble of 1 cm is not held by any rung: it tells the smallest, by halves, to which no ray \
+               is lost and whose hits are off by less than a tenth of its radius. Put the origin where the details are. \
+               Red: larger than 4·10⁻⁶.",
         columns: Rung::columns(),
         rows,
     }
@@ -1039,7 +1063,7 @@ fn odd_scenes() -> Table {
         ROUNDED,
     );
     add(
-        "no lights, no ambient light",
+        "no lights, but ambient light",
         &|| {
             let mut desc = lit(1.0);
             desc.lights.clear();

@@ -356,7 +356,7 @@ fn best_of<const N: usize>(part: &Part, bins: usize) -> Option<Split> {
         for i in 0..SAMPLE {
             let [from, to] = [i, i + 1].map(|i| i * n / SAMPLE);
             let turn = u64::from((i as u32).wrapping_mul(GOLDEN));
-            let within = (turn * (to - from) as u64 >> 32) as usize;
+            let within = ((turn * (to - from) as u64) >> 32) as usize;
             counted.add(&map, &part.refs[from + within]);
         }
     }

@@ -42,6 +42,9 @@ pub struct TradeOptions {
     pub targets: Vec<Target>,
     /// Seconds that reading the scene took, and writing a picture of that size takes.
     pub read_and_write: f64,
+    /// Flags of `alhazen render` that make what is measured of the scene's file, value and all: what is
+    /// recommended holds with them.
+    pub given: Vec<Vec<String>>,
 }
 
 /// The picture that others are compared with.

@@ -91,8 +91,13 @@ fn recommended(scene: &str, found: &Recommendation) -> String {
 
 /// Words as a shell takes them.
 pub fn quoted(words: &[String]) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=./:,+%@".contains(c);
     let word = |word: &String| {
-        if word.contains('"') { format!("'{word}'") } else { word.clone() }
+        if word.chars().all(is_plain) && !word.is_empty() {
+            word.clone()
+        } else {
+            format!("'{}'", word.replace('\'', r"'\''"))
+        }
     };
     words.iter().map(word).collect::<Vec<_>>().join(" ")
 }

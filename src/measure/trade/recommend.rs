@@ -22,7 +22,8 @@ pub enum Target {
 pub struct Recommendation {
     /// What for.
     pub target: Target,
-    /// Flags of `alhazen render` beside the scene.
+    /// Flags of `alhazen render` beside the scene: those that were given, its size in pixels among them, and
+    /// what the scene as it stands is to be changed by.
     pub flags: Vec<String>,
     /// Relative error against the reference, as measured with them.
     pub error: f64,
@@ -125,7 +126,7 @@ pub(super) fn recommend(
         combine(&mut choice, turn);
     }
     // What to fall back on where a bias shows that no knob by itself had.
-    let mut safer = vec![reference_choice(&base.choice)];
+    let mut safer = vec![safest(report)];
     if !chosen.is_empty() {
         safer.push(base.choice.clone());
     }
@@ -246,8 +247,37 @@ fn attempt(
         }
         Target::Time(most) => (seconds <= most && samples >= choice.settings.samples, false),
     };
-    let flags = choice.flags(base);
+    let flags = with_given(&trade.options.given, choice.flags(base));
     Ok((Recommendation { target, flags, error, seconds, is_reached, tries }, is_biased, samples))
+}
+
+/// Flags of a choice beside those that were given, of which it replaces some.
+fn with_given(given: &[Vec<String>], flags: Vec<String>) -> Vec<String> {
+    let is_replaced = |name: &String| {
+        // Samples that were given would end a render before it has an error.
+        let replaced = |flag: &String| flag == name || (flag == "--error" && name == "--samples");
+        // Of fields the last counts.
+        name != "--set" && flags.iter().any(replaced)
+    };
+    let kept = given.iter().filter(|words| !words.first().is_some_and(is_replaced));
+    kept.flatten().cloned().chain(flags.iter().cloned()).collect()
+}
+
+/// The scene as it stands with what its reference has of the knobs that matter to it.
+fn safest(report: &TradeReport) -> Choice {
+    let mut choice = report.base.choice.clone();
+    let from = reference_choice(&choice).settings;
+    let matters = |name: &str| report.knobs.iter().any(|knob| knob.name == name);
+    let to = &mut choice.settings;
+    if matters("max_depth") {
+        to.max_depth = from.max_depth;
+        (to.prune, to.roulette) = (from.prune, from.roulette);
+    }
+    if matters("tolerance") {
+        to.tolerance = from.tolerance;
+    }
+    (to.precision, to.epsilon) = (from.precision, from.epsilon);
+    choice
 }
 
 /// The most samples that anything was measured with.
@@ -305,8 +335,12 @@ fn choose<'t, 'a>(model: &Model, all: &'t [Turn<'a>], target: Target) -> Vec<&'t
         }
     };
     let mut chosen: Vec<&Turn<'_>> = Vec::new();
-    // The tree's pruning and roulette are one field.
-    let group = |turn: &Turn<'_>| if turn.knob == "roulette" { "prune" } else { turn.knob };
+    // The tree's pruning and roulette are one field, and a high build is one of fast queries.
+    let group = |turn: &Turn<'_>| match turn.knob {
+        "roulette" => "prune",
+        "build_quality" => "precision",
+        knob => knob,
+    };
     loop {
         let now = cost(&chosen);
         let free = all.iter().filter(|turn| chosen.iter().all(|c| group(c) != group(turn)));
@@ -335,6 +369,7 @@ fn combine(choice: &mut Choice, turn: &Turn<'_>) {
         "shadow_samples" => to.shadow_samples = from.shadow_samples,
         "light_samples" => to.light_samples = from.light_samples,
         "tolerance" => to.tolerance = from.tolerance,
+        "texture_filter" => to.texture_filter = from.texture_filter,
         "precision" => to.precision = from.precision,
         "epsilon" => to.epsilon = from.epsilon,
         "build_quality" => {
@@ -343,6 +378,39 @@ fn combine(choice: &mut Choice, turn: &Turn<'_>) {
         "compact" => to.compact = from.compact,
         "accel" => choice.kind = turn.point.choice.kind,
         "packets" => choice.single_rays = turn.point.choice.single_rays,
-        _ => {}
+        knob => debug_assert!(matches!(knob, "adaptive"), "{knob} is measured but never turned"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(text: &str) -> Vec<String> {
+        text.split_whitespace().map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn flags_that_were_given_stay_unless_they_are_replaced() {
+        let given: Vec<_> = [
+            "--set camera.fov=30",
+            "--size 64x48",
+            "--samples 4",
+            "--accel bvh",
+            "--set render.prune=0.1",
+        ]
+        .map(words)
+        .into();
+        let joined = |flags: &str| with_given(&given, words(flags)).join(" ");
+        assert_eq!(
+            joined("--samples 9 --set render.prune=0"),
+            "--set camera.fov=30 --size 64x48 --accel bvh --set render.prune=0.1 --samples 9 --set \
+             render.prune=0"
+        );
+        assert_eq!(
+            joined("--accel embree --error 0.01 --adaptive"),
+            "--set camera.fov=30 --size 64x48 --set render.prune=0.1 --accel embree --error 0.01 --adaptive"
+        );
+        assert_eq!(with_given(&[], words("--samples 2")), words("--samples 2"));
     }
 }
