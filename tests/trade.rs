@@ -161,7 +161,7 @@ fn what_is_recommended_for_a_time_is_a_whole_command() {
     let stats: Value = serde_json::from_str(&stats).unwrap();
     let seconds = stats["seconds"]["total"].as_f64().unwrap();
     // Machines are busy at times; sixteen times as long is no such time.
-    assert!(seconds < 6.0, "{seconds}: {flags:?}");
+    assert!(seconds < 12.0, "{seconds}: {flags:?}");
     assert_eq!(read_picture(&folder.join("this.exr")).unwrap().extent, [320, 240]);
 }
 
