@@ -230,7 +230,7 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
 
     /// Such points, sheared.
     #[inline(always)]
-    pub(super) fn sheared<S: Simd<F8 = F>>(&self, _simd: S, [x, y, z]: [F; 3]) -> [F; 3] {
+    pub(super) fn sheared(&self, [x, y, z]: [F; 3]) -> [F; 3] {
         [self.shear[0].neg_mul_add(z, x), self.shear[1].neg_mul_add(z, y), z]
     }
 }

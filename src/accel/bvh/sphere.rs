@@ -55,7 +55,7 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
         t_max: f32,
     ) -> (u32, [f32; WIDTH]) {
         let [x, y, z] = self.seen(simd, self.axes.map(|axis| &block.rounded[axis]));
-        let [across_x, across_y, _] = self.sheared(simd, [x, y, z]);
+        let [across_x, across_y, _] = self.sheared([x, y, z]);
         let [shear_x, shear_y] = self.shear;
         let third = across_x.mul_sub(shear_y, across_y.mul(shear_x));
         let passes = third.mul_add(third, across_x.mul_add(across_x, across_y.mul(across_y)));

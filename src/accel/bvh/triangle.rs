@@ -38,9 +38,9 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
         block: &TriangleBlock,
     ) -> Candidates<F> {
         let [xs, ys, zs] = self.axes.map(|axis| &block.corners[axis]);
-        let [ax, ay, az] = self.sheared(simd, self.seen(simd, [&xs[0], &ys[0], &zs[0]]));
-        let [bx, by, bz] = self.sheared(simd, self.seen(simd, [&xs[1], &ys[1], &zs[1]]));
-        let [cx, cy, cz] = self.sheared(simd, self.seen(simd, [&xs[2], &ys[2], &zs[2]]));
+        let [ax, ay, az] = self.sheared(self.seen(simd, [&xs[0], &ys[0], &zs[0]]));
+        let [bx, by, bz] = self.sheared(self.seen(simd, [&xs[1], &ys[1], &zs[1]]));
+        let [cx, cy, cz] = self.sheared(self.seen(simd, [&xs[2], &ys[2], &zs[2]]));
         let u = cross::<F, ROBUST>(cx, cy, bx, by);
         let v = cross::<F, ROBUST>(ax, ay, cx, cy);
         let w = cross::<F, ROBUST>(bx, by, ax, ay);
