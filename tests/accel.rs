@@ -142,6 +142,9 @@ fn random_ray(random: &mut Random) -> Ray {
     if random.unit() < 0.2 {
         ray.t_max = random.between(0.5, 12.0) as f32;
     }
+    if random.unit() < 0.3 {
+        ray.t_min = random.between(0.0, 10.0) as f32;
+    }
     ray
 }
 
@@ -258,7 +261,8 @@ fn blocks_that_differ(kind: AccelKind) -> usize {
             let active = random.bits() as u16;
             for lane in (0..LANES).filter(|lane| active >> lane & 1 == 1) {
                 let d = ray.direction + (random.in_cube() * 0.02).as_vec3();
-                block.set(lane, &Ray { direction: d.normalize(), ..ray });
+                let t_min = ray.t_min * random.unit() as f32;
+                block.set(lane, &Ray { direction: d.normalize(), t_min, ..ray });
             }
             assert_eq!(block.active(), active);
             let hits = accel.intersect_block(&block);

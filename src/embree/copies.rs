@@ -19,6 +19,7 @@ pub(super) struct Copies {
 
 /// Fields of `RTCRayN`: arrays of N floats each.
 const ORG: usize = 0;
+const T_NEAR: usize = 3;
 const DIR: usize = 4;
 
 /// Copies the precomputed box of one copy.
@@ -32,18 +33,19 @@ pub(super) unsafe extern "C" fn bounds(args: *const sys::RTCBoundsFunctionArgume
     }
 }
 
-/// Origins and directions of `N` rays in the space of one copy; nothing else of the packet is read when it
-/// is forwarded.
+/// Where `N` rays start in the space of one copy, and where they go: forwarding reads origins, directions
+/// and t_min, and takes the rest from the ray that it came with.
 ///
 /// # Safety
 /// `rays` points to an `RTCRayN` (or `RTCRayHitN`) of width `N`.
 #[inline(always)]
 unsafe fn to_object<const N: usize>(rays: *const f32, m: &Transform3x4) -> RayPacket<N> {
-    // SAFETY: fields 0 to 2 and 4 to 6 of the structure are arrays of N floats each.
+    // SAFETY: fields 0 to 6 of the structure are arrays of N floats each.
     let field = |i: usize| unsafe { &*rays.add(i * N).cast::<[f32; N]>() };
     let [ox, oy, oz] = [field(ORG), field(ORG + 1), field(ORG + 2)];
     let [dx, dy, dz] = [field(DIR), field(DIR + 1), field(DIR + 2)];
     let mut packet = RayPacket::<N>::empty();
+    packet.t_min = *field(T_NEAR);
     for i in 0..N {
         let turned = |row: usize, [x, y, z]: [f32; 3]| {
             m[4 * row] * x + m[4 * row + 1] * y + m[4 * row + 2] * z
@@ -71,7 +73,7 @@ unsafe fn ray_to_object(ray: *const f32, m: &Transform3x4) -> sys::RTCRay {
         org_x: packet.org_x[0],
         org_y: packet.org_y[0],
         org_z: packet.org_z[0],
-        tnear: 0.0,
+        tnear: packet.t_min[0],
         dir_x: packet.dir_x[0],
         dir_y: packet.dir_y[0],
         dir_z: packet.dir_z[0],
