@@ -6,7 +6,7 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
-#[path = "../tests/common/extremes.rs"]
+#[path = "../tests/common/extremes/mod.rs"]
 mod extremes;
 
 fn main() {

@@ -3,7 +3,7 @@
 #![allow(missing_docs, clippy::print_stderr, reason = "a test program")]
 
 mod common;
-#[path = "common/extremes.rs"]
+#[path = "common/extremes/mod.rs"]
 mod extremes;
 
 #[test]
