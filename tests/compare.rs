@@ -121,6 +121,12 @@ fn limits_are_exit_code_1_with_a_line_for_each() {
     let looks = ["--max-flip", "1", "--max-hdr-flip", "1"];
     assert_eq!(compare(folder.path(), &[&pair[..], &within, &looks].concat()).0, 0);
 
+    assert_eq!(compare(folder.path(), &[&pair[..], &["--min-psnr", "19.8"]].concat()).0, 0);
+    assert_eq!(compare(folder.path(), &["ref.exr", "ref.exr", "--min-psnr", "900"]).0, 0);
+    let (code, _, error) = compare(folder.path(), &[&pair[..], &["--min-psnr", "19.9"]].concat());
+    assert_eq!(code, 1);
+    assert_eq!(error, "alhazen: test.exr: psnr is 19.822712, less than 19.900000\n");
+
     let beyond = ["--max-mse", "0.01", "--max-mae", "0.042", "--max-relmse=1e-9", "--max-flip=0"];
     let (code, table, error) = compare(folder.path(), &[&pair[..], &beyond].concat());
     assert_eq!(code, 1, "{error}");
@@ -252,6 +258,10 @@ fn a_png_is_compared_with_an_exr_in_linear_light() {
     assert!(found["max"].as_f64().unwrap() > 1e-4, "{found}");
     assert!(found["flip"].as_f64().unwrap() < 0.02, "{found}");
     assert!(found["psnr"].as_f64().unwrap() > 50.0, "{found}");
+    let found = json(folder.path(), &["p.png", "p.exr", "--channels"]);
+    let names = found["channels"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap());
+    assert_eq!(names.collect::<Vec<_>>(), ["R", "G", "B"]);
+    assert!(found["channels"][0]["max"].as_f64().unwrap() < 0.0046, "{found}");
 }
 
 #[test]
@@ -331,7 +341,107 @@ fn channels_are_compared_one_by_one() {
     assert!(alhazen(folder, &all).status.success());
     let (code, _, error) = compare(folder, &["a.exr", "c.exr", "--channels"]);
     assert!(code == 2 && error.contains("c.exr lacks Z"), "{error}");
-    // Colours alone are the same question as ever.
-    assert_eq!(compare(folder, &["a.exr", "c.exr"]).0, 0);
-    assert!(json(folder, &["a.exr", "b.exr"])["channels"].is_null());
+    // Colours alone are the same question as ever, and what else there is is named.
+    let (code, out, _) = compare(folder, &["a.exr", "c.exr"]);
+    assert!(code == 0 && out.contains("  channels  c.exr lacks Z\n"), "{out}");
+    assert!(!compare(folder, &["a.exr", "b.exr"]).1.contains("channels"));
+    let report = json(folder, &["c.exr", "a.exr"]);
+    assert_eq!(report["only_in_picture"], serde_json::json!([]));
+    assert_eq!(report["only_in_reference"], serde_json::json!(["Z"]));
+    assert!(report["channels"].is_null() && report["layers"].is_null());
+}
+
+/// Layers have rows of their own: what their channels come to together, and of colours how they look.
+#[test]
+fn layers_are_compared_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scene = "[image]\nsize = [16, 12]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n\
+                 [materials.paint]\ntype = \"diffuse\"\nreflectance = [0.5, 0.25, 0.75]\n\
+                 [[objects]]\nshape = \"disk\"\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\nradius = 50\n\
+                 material = \"paint\"\n";
+    std::fs::write(folder.join("s.toml"), scene).unwrap();
+    let lighter = "materials.paint.reflectance=[0.75,0.25,0.75]";
+    for (name, more) in [("a.exr", "image.size=[16,12]"), ("b.exr", lighter)] {
+        let layers = ["--layers", "albedo,normal", "--set", more];
+        let all = [&["render", "s.toml", "-q", "-o", name][..], &layers].concat();
+        assert!(alhazen(folder, &all).status.success());
+    }
+    let report = json(folder, &["a.exr", "b.exr", "--channels"]);
+    let layers = report["layers"].as_array().unwrap();
+    let by_name = |name: &str| layers.iter().find(|c| c["name"] == name).unwrap();
+    let albedo = by_name("albedo");
+    let near = |value: &serde_json::Value, expected: f64| {
+        assert!((value.as_f64().unwrap() - expected).abs() < 1e-3 * expected, "{value} {expected}");
+    };
+    // One channel of three is off by a quarter.
+    near(&albedo["mse"], 0.0625 / 3.0);
+    near(&albedo["mae"], 0.25 / 3.0);
+    near(&albedo["relmse"], 0.0625 / (0.75 * 0.75 + 0.01) / 3.0);
+    near(&albedo["psnr"], 10.0 * (3.0f64 / 0.0625).log10());
+    near(&albedo["max"], 0.25);
+    assert!(albedo["flip"].as_f64().unwrap() > 0.01, "{albedo}");
+    assert!(by_name("normal")["flip"].is_null() && by_name("normal")["max"] == 0.0);
+    let channels = report["channels"].as_array().unwrap();
+    let red = channels.iter().find(|c| c["name"] == "albedo.R").unwrap();
+    near(&red["psnr"], 10.0 * (1.0f64 / 0.0625).log10());
+
+    let pair = ["a.exr", "b.exr", "-q"];
+    let limited = |limits: &[&str]| compare(folder, &[&pair[..], limits].concat());
+    let within =
+        ["--limit", "albedo.R:mae=0.251", "--limit", "albedo:psnr=16", "--limit=normal:max=0"];
+    assert_eq!(limited(&within), (0, String::new(), String::new()));
+    let (code, _, error) = limited(&["--limit", "albedo.R:mae=0.249", "--limit", "albedo:psnr=17"]);
+    assert_eq!(code, 1);
+    let lines: Vec<&str> = error.lines().collect();
+    assert!(lines[0].starts_with("alhazen: a.exr: albedo.R: mae is 0.2"), "{error}");
+    assert_eq!(lines[1], "alhazen: a.exr: albedo: psnr is 16.812412, less than 17.000000");
+    for (limit, message) in [
+        ("Z:mae=1", "--limit: no channel or layer `Z`; there are: B, G, R, albedo.B"),
+        ("normal:flip=1", "--limit: normal has no flip; accepted: mse, mae, relmse, max"),
+        ("normal:far=1", "expected CHANNEL:METRIC=X"),
+        ("normal:mse=-1", "expected a number that is not negative"),
+        ("normal", "expected CHANNEL:METRIC=X"),
+    ] {
+        let (code, _, error) = limited(&["--limit", limit]);
+        assert!(code == 2 && error.contains(message), "{limit}: {error}");
+    }
+}
+
+/// Ids of a Cryptomatte are the same or not; their values are no numbers.
+#[test]
+fn ids_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scene = |name: &str| {
+        format!(
+            "[image]\nsize = [16, 12]\n[camera]\neye = [0, 0, 5]\ntarget = [0, 0, 0]\n\
+             [[objects]]\nname = \"{name}\"\nshape = \"disk\"\ncenter = [0, 0, 0]\nnormal = [0, 0, 1]\n\
+             radius = 50\n"
+        )
+    };
+    for (name, object) in [("a", "left"), ("b", "right")] {
+        std::fs::write(folder.join(format!("{name}.toml")), scene(object)).unwrap();
+        let (from, to) = (format!("{name}.toml"), format!("{name}.exr"));
+        let all = ["render", &from, "-q", "-o", &to, "--layers", "crypto_object", "--samples", "4"];
+        assert!(alhazen(folder, &all).status.success());
+    }
+    let report = json(folder, &["a.exr", "b.exr", "--channels"]);
+    let row = |list: &str, name: &str| {
+        let rows = report[list].as_array().unwrap();
+        rows.iter().find(|c| c["name"] == name).unwrap().clone()
+    };
+    let ids = row("channels", "CryptoObject00.R");
+    assert!(ids["differing"] == 16 * 12 && ids["mse"].is_null(), "{ids}");
+    assert_eq!(row("channels", "CryptoObject00.G")["max"], 0.0, "shares are numbers");
+    let layer = row("layers", "CryptoObject00");
+    assert!(
+        layer["differing"] == 16 * 12 && layer["max"] == 0.0 && layer["flip"].is_null(),
+        "{layer}"
+    );
+    let limited =
+        |a: &str| compare(folder, &[a, "b.exr", "-q", "--limit", "CryptoObject00:differing=0"]);
+    assert_eq!(limited("b.exr").0, 0);
+    let (code, _, error) = limited("a.exr");
+    assert!(code == 1 && error.contains("differing is 192.000000, more than 0.000000"), "{error}");
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 
+use super::compare::{ChannelLimit, parse_channel_limit};
 use super::units::{
     Part, parse_bytes, parse_count, parse_crop, parse_part, parse_share, parse_size, parse_time,
 };
@@ -303,6 +304,10 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "X", value_parser = parse_limit)]
     pub(super) max_relmse: Option<f64>,
 
+    /// Least peak signal-to-noise ratio, in decibels
+    #[arg(long, value_name = "DB", value_parser = parse_limit)]
+    pub(super) min_psnr: Option<f64>,
+
     /// Largest mean FLIP
     #[arg(long, value_name = "X", value_parser = parse_limit)]
     pub(super) max_flip: Option<f64>,
@@ -315,9 +320,14 @@ pub(super) struct CompareArgs {
     #[arg(long)]
     pub(super) hdr_flip: bool,
 
-    /// Also every channel of two EXR files by itself, layers included; channels that only one has are an error
+    /// Also every channel and layer by itself; channels that only one file has are an error
     #[arg(long)]
     pub(super) channels: bool,
+
+    /// Largest error of a channel or layer, as in `Z:mae=0.01` or `normal:max=1e-4`; metrics: mse, mae, relmse,
+    /// psnr (the least), flip, max, differing (ids of a Cryptomatte); implies --channels, repeatable
+    #[arg(long, value_name = "CHANNEL:METRIC=X", value_parser = parse_channel_limit)]
+    pub(super) limit: Vec<ChannelLimit>,
 
     /// Write a picture of the difference: .png shows FLIP from black to yellow (cyan: not finite), .exr
     /// holds absolute differences

@@ -69,23 +69,22 @@ fn decode_layer(path: &Path, bytes: &[u8]) -> Result<Picture, ReadError> {
     Ok(Picture { size, extent, origin: Some(origin), pixels })
 }
 
-/// All channels of the only part of an EXR file, by name.
+/// All channels of a picture, by name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PictureChannels {
     /// The pixels that it holds, across and down.
     pub extent: [u32; 2],
-    /// Where the first of them lies in the whole.
-    pub origin: [i32; 2],
+    /// Where the first of them lies in the whole, if that is said.
+    pub origin: Option<[i32; 2]>,
     /// Names and values, row by row from the top; whole numbers as the nearest float.
     pub channels: Vec<(String, Vec<f32>)>,
+    /// What the header of an EXR file says of it, by name.
+    pub attributes: Vec<Attribute>,
 }
 
-/// Reads all channels of an EXR file: half, float and whole numbers.
-///
-/// # Errors
-/// [`ReadError`] where the file cannot be read, is not a sound EXR file, or has several parts.
-pub fn read_picture_channels(path: &Path) -> Result<PictureChannels, ReadError> {
-    with_only_part(path, |parts| {
+/// All channels of the only part of an EXR file: half, float and whole numbers.
+pub(super) fn decode_channels(path: &Path, bytes: &[u8]) -> Result<PictureChannels, ReadError> {
+    only_part(path, bytes, |parts| {
         let (head, count) = head(parts)?;
         let list = &parts.meta.headers[0].channels.list;
         let mut channels = Vec::new();
@@ -100,7 +99,16 @@ pub fn read_picture_channels(path: &Path) -> Result<PictureChannels, ReadError> 
                 *to = sample(kind, value);
             }
         })?;
-        Ok(PictureChannels { extent: head.extent, origin: head.origin, channels })
+        let ExrHead { extent, origin, attributes, .. } = head;
+        Ok(PictureChannels { extent, origin: Some(origin), channels, attributes })
+    })
+}
+
+/// The names of the channels of the only part of an EXR file.
+pub(super) fn decode_channel_names(path: &Path, bytes: &[u8]) -> Result<Vec<String>, ReadError> {
+    only_part(path, bytes, |parts| {
+        let list = &parts.meta.headers[0].channels.list;
+        Ok(list.iter().map(|channel| channel.name.to_string()).collect())
     })
 }
 
@@ -168,8 +176,16 @@ fn with_only_part<T>(
     if !bytes.starts_with(&SIGNATURE) {
         return Err(ReadError::file(path, "not an EXR file"));
     }
+    only_part(path, &bytes, read)
+}
+
+fn only_part<T>(
+    path: &Path,
+    bytes: &[u8],
+    read: impl FnOnce(&Parts<'_>) -> Result<T, ReadError>,
+) -> Result<T, ReadError> {
     let decoded = catch_unwind(AssertUnwindSafe(|| {
-        let parts = Parts::read(path, &bytes)?;
+        let parts = Parts::read(path, bytes)?;
         match parts.meta.headers.as_slice() {
             [header] if header.deep => {
                 Err(ReadError::file(path, "it holds deep data; accepted: one value a pixel"))

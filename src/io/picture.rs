@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::error::ReadError;
+use super::exr_read::PictureChannels;
 use super::source::Source;
 use super::{exr_read, image};
 use crate::color::linear_from_srgb;
@@ -26,6 +27,39 @@ pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
         Err(ReadError::file(path, "unknown kind of picture; accepted: EXR, PNG"))
     }
 }
+
+/// Reads all channels of an EXR file, or the three colours of a PNG file as [`read_png`] does.
+///
+/// # Errors
+/// [`ReadError`] where it cannot be read, is neither, or is not sound, or where it is an EXR file of several
+/// parts.
+pub fn read_picture_channels(path: &Path) -> Result<PictureChannels, ReadError> {
+    let bytes = Source::open(path)?.read_from(0)?;
+    if bytes.starts_with(&exr_read::SIGNATURE) {
+        return exr_read::decode_channels(path, &bytes);
+    }
+    let Picture { extent, origin, pixels, .. } = read_picture(path)?;
+    let colours = COLOURS.into_iter().enumerate();
+    let values = |i: usize| pixels.iter().map(|c| c.to_array()[i]).collect();
+    let channels = colours.map(|(i, name)| (name.to_owned(), values(i))).collect();
+    Ok(PictureChannels { extent, origin, channels, attributes: Vec::new() })
+}
+
+/// The names of the channels that [`read_picture_channels`] gives.
+///
+/// # Errors
+/// As it.
+pub fn read_channel_names(path: &Path) -> Result<Vec<String>, ReadError> {
+    let bytes = Source::open(path)?.read_from(0)?;
+    if bytes.starts_with(&exr_read::SIGNATURE) {
+        exr_read::decode_channel_names(path, &bytes)
+    } else {
+        Ok(COLOURS.map(str::to_owned).into())
+    }
+}
+
+/// The channels of a picture that has only colours.
+const COLOURS: [&str; 3] = ["R", "G", "B"];
 
 /// Reads a PNG file of 1 to 16 bits a channel, in grey, colour or with a palette. Its values are taken as
 /// sRGB, whatever the file says of its gamma; alpha is left out, and of an animation all but the first

@@ -1,10 +1,12 @@
 //! Two pictures channel by channel: for what is not a colour, layers of depth, normals, ids.
 
-/// How far a channel is from that of a reference. Means run over pixels where both are finite; every number
-/// is NaN where there is none.
+/// How far a channel, or a layer of several, is from that of a reference. Means run over values where both
+/// are finite; every number is NaN where there is none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelComparison {
-    /// Pixels that are NaN or infinite in one of the two at least, and not the same infinity in both.
+    /// Values that are finite in both.
+    pub count: u64,
+    /// Values that are NaN or infinite in one of the two at least, and not the same infinity in both.
     pub non_finite: u64,
     /// Mean of (a − b)².
     pub mse: f64,
@@ -12,6 +14,9 @@ pub struct ChannelComparison {
     pub mae: f64,
     /// Mean of (a − b)² / (b² + 0.01), where b is the reference.
     pub rel_mse: f64,
+    /// 10 log₁₀(1 / mean squared error) in decibels, of both clipped to [0, 1]; infinite where they are then
+    /// equal.
+    pub psnr: f64,
     /// The largest |a − b|.
     pub largest: f64,
     /// The pixel that it is at, right of and below the first.
@@ -20,8 +25,8 @@ pub struct ChannelComparison {
 
 /// Compares the values of a channel with those of a reference, row by row of `width` pixels.
 pub fn compare_channel(a: &[f32], b: &[f32], width: u32) -> ChannelComparison {
-    let (mut pixels, mut non_finite) = (0u64, 0u64);
-    let (mut square, mut absolute, mut relative) = (0.0, 0.0, 0.0);
+    let (mut count, mut non_finite) = (0u64, 0u64);
+    let (mut square, mut absolute, mut relative, mut clipped) = (0.0, 0.0, 0.0, 0.0);
     let mut largest = (0.0f64, 0usize);
     for (i, (&a, &b)) in a.iter().zip(b).enumerate() {
         if !(a.is_finite() && b.is_finite()) {
@@ -30,24 +35,62 @@ pub fn compare_channel(a: &[f32], b: &[f32], width: u32) -> ChannelComparison {
         }
         let (a, b) = (f64::from(a), f64::from(b));
         let d = a - b;
-        pixels += 1;
+        count += 1;
         square += d * d;
         absolute += d.abs();
         relative += d * d / (b * b + 0.01);
+        clipped += (a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0)).powi(2);
         if d.abs() > largest.0 {
             largest = (d.abs(), i);
         }
     }
-    let mean = |sum: f64| sum / pixels as f64;
-    let width = width.max(1) as usize;
+    let mean = |sum: f64| sum / count as f64;
     ChannelComparison {
+        count,
         non_finite,
         mse: mean(square),
         mae: mean(absolute),
         rel_mse: mean(relative),
-        largest: if pixels == 0 { f64::NAN } else { largest.0 },
-        largest_at: [(largest.1 % width) as u32, (largest.1 / width) as u32],
+        psnr: -10.0 * mean(clipped).log10(),
+        largest: if count == 0 { f64::NAN } else { largest.0 },
+        largest_at: pixel(largest.1, width),
     }
+}
+
+/// What the channels of a layer come to together.
+pub fn compare_layer(channels: &[ChannelComparison]) -> ChannelComparison {
+    // An empty channel has nothing to say, and its means are NaN.
+    let known = || channels.iter().filter(|c| c.count > 0);
+    let count: u64 = known().map(|c| c.count).sum();
+    let mean = |of: &dyn Fn(&ChannelComparison) -> f64| {
+        known().map(|c| of(c) * c.count as f64).sum::<f64>() / count as f64
+    };
+    let largest = known().max_by(|a, b| a.largest.total_cmp(&b.largest));
+    ChannelComparison {
+        count,
+        non_finite: channels.iter().map(|c| c.non_finite).sum(),
+        mse: mean(&|c| c.mse),
+        mae: mean(&|c| c.mae),
+        rel_mse: mean(&|c| c.rel_mse),
+        psnr: -10.0 * mean(&|c| 10f64.powf(-0.1 * c.psnr)).log10(),
+        largest: largest.map_or(f64::NAN, |c| c.largest),
+        largest_at: largest.map_or([0, 0], |c| c.largest_at),
+    }
+}
+
+/// How many values are not the same to the last bit, and the first pixel where they are not: for ids, which
+/// are names and not numbers.
+pub fn count_differing(a: &[f32], b: &[f32], width: u32) -> (u64, [u32; 2]) {
+    let mut differing =
+        a.iter().zip(b).enumerate().filter(|(_, (a, b))| a.to_bits() != b.to_bits());
+    let first = differing.next();
+    let count = u64::from(first.is_some()) + differing.count() as u64;
+    (count, pixel(first.map_or(0, |(i, _)| i), width))
+}
+
+fn pixel(index: usize, width: u32) -> [u32; 2] {
+    let width = width.max(1) as usize;
+    [(index % width) as u32, (index / width) as u32]
 }
 
 #[cfg(test)]
@@ -60,9 +103,44 @@ mod tests {
         let b = [1.0, 1.0, 1.0, f32::INFINITY, 0.5, 5.0];
         let found = compare_channel(&a, &b, 3);
         // Of four pixels two differ, by 1 and by 2.
-        assert_eq!((found.mse, found.mae, found.non_finite), (5.0 / 4.0, 3.0 / 4.0, 1));
+        assert_eq!((found.count, found.non_finite), (4, 1));
+        assert_eq!((found.mse, found.mae), (5.0 / 4.0, 3.0 / 4.0));
         assert!((found.rel_mse - (1.0 / 1.01 + 4.0 / 25.01) / 4.0).abs() < 1e-12);
         assert_eq!((found.largest, found.largest_at), (2.0, [2, 1]));
+        // Clipped to [0, 1] they are the same.
+        assert_eq!(found.psnr, f64::INFINITY);
         assert!(compare_channel(&[f32::NAN], &[1.0], 1).mse.is_nan());
+    }
+
+    /// A layer is what one channel with the values of all of them would be.
+    #[test]
+    fn layers_are_their_channels_together() {
+        let (a, b) = ([0.1, 0.9, f32::NAN, 0.3], [0.2, 0.5, 0.0, 0.3]);
+        let (c, d) = ([5.0, f32::NAN, f32::NAN, f32::NAN], [4.0; 4]);
+        let together = compare_layer(&[
+            compare_channel(&a, &b, 2),
+            compare_channel(&c, &d, 2),
+            compare_channel(&[f32::NAN; 4], &d, 2),
+        ]);
+        let joined = |x: &[f32], y: &[f32]| [x, y, &[f32::NAN; 4]].concat();
+        let whole = compare_channel(&joined(&a, &c), &joined(&b, &d), 2);
+        assert_eq!((together.count, together.non_finite), (4, 8));
+        assert_eq!((whole.count, whole.non_finite), (4, 4 + 4));
+        for (x, y) in [
+            (together.mse, whole.mse),
+            (together.mae, whole.mae),
+            (together.rel_mse, whole.rel_mse),
+            (together.psnr, whole.psnr),
+            (together.largest, whole.largest),
+        ] {
+            assert!((x - y).abs() < 1e-9, "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn ids_are_the_same_or_not() {
+        let a = [1.0, 2.0, 3.0, f32::NAN];
+        assert_eq!(count_differing(&a, &a, 2), (0, [0, 0]));
+        assert_eq!(count_differing(&a, &[1.0, 2.0, 3.0f32.next_up(), 0.0], 2), (2, [0, 1]));
     }
 }

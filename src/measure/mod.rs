@@ -11,7 +11,7 @@ pub mod trade;
 
 use rayon::prelude::*;
 
-pub use channel::{ChannelComparison, compare_channel};
+pub use channel::{ChannelComparison, compare_channel, compare_layer, count_differing};
 pub use flip::{Exposures, PIXELS_PER_DEGREE, flip, hdr_flip};
 
 use crate::color::{Rgb, linear_from_srgb};

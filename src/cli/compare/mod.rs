@@ -1,5 +1,10 @@
 //! `alhazen compare`: how far a picture is from a reference, and whether that is near enough.
 
+mod channels;
+mod limits;
+
+pub(super) use limits::{ChannelLimit, parse_channel_limit};
+
 use std::path::Path;
 
 use serde::Serialize;
@@ -10,13 +15,12 @@ use super::units::grouped;
 use super::{Failure, Outcome, print};
 use crate::film::{Film, Layers, Picture, PixelRect};
 use crate::io::{
-    ExrOptions, PictureChannels, PixelType, ToneMap, WriteError, read_picture,
-    read_picture_channels, write_exr, write_png, write_text,
+    ExrOptions, PixelType, ToneMap, WriteError, read_picture, write_exr, write_png, write_text,
 };
 use crate::measure::{
-    CompareOptions, Comparison, absolute_difference, check_same_pixels, compare as measure,
-    compare_channel, magma,
+    CompareOptions, Comparison, absolute_difference, check_same_pixels, compare as measure, magma,
 };
+use channels::{Row, Rows, Unequal};
 
 /// The fields of `--json`; their names are stable. A number that is infinite or undefined is null.
 #[derive(Debug, Serialize)]
@@ -37,22 +41,14 @@ struct Report<'a> {
     /// First and last, in stops.
     hdr_flip_exposures: Option<[f32; 2]>,
     non_finite: u64,
+    /// Channels that one file alone has.
+    only_in_picture: &'a [String],
+    only_in_reference: &'a [String],
     /// Where they were asked for.
-    channels: Option<Vec<Channel>>,
+    channels: Option<&'a [Row]>,
+    layers: Option<&'a [Row]>,
     /// Whether no limit was exceeded.
     passed: bool,
-}
-
-/// A channel by itself.
-#[derive(Debug, Clone, Serialize)]
-struct Channel {
-    name: String,
-    mse: f64,
-    mae: f64,
-    relmse: f64,
-    max: f64,
-    max_at: [u32; 2],
-    non_finite: u64,
 }
 
 /// A picture of the difference.
@@ -79,9 +75,12 @@ pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
         hdr_flip: args.hdr_flip || args.max_hdr_flip.is_some(),
         ..CompareOptions::default()
     };
-    let channels = args.channels.then(|| channels(args)).transpose()?;
+    let others = Unequal::of(args);
+    let by_channel = args.channels || !args.limit.is_empty();
+    let rows = by_channel.then(|| channels::compared(args, &others)).transpose()?;
     let found = measure(&a, &b, &options).map_err(unequal)?;
-    let exceeded = exceeded(args, &found);
+    let none = Rows::default();
+    let exceeded = limits::exceeded(args, &found, rows.as_ref().unwrap_or(&none))?;
 
     let failed = |e: WriteError| Failure::Failed(e.to_string());
     match difference {
@@ -98,74 +97,16 @@ pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
         None => {}
     }
     if let Some(path) = &args.json {
-        write_json(path, args, &found, channels.clone(), exceeded.is_empty())?;
+        write_json(path, args, &found, &others, rows.as_ref(), exceeded.is_empty())?;
     }
     if !args.quiet {
-        print_table(args, &found);
-        print_channels(channels.as_deref().unwrap_or_default());
+        print_table(args, &found, &others);
+        channels::print_rows(rows.as_ref().unwrap_or(&none));
         for path in args.difference.iter().chain(&args.json) {
             print(&format!("{:>10}  {}", "wrote", path.display()));
         }
     }
     if exceeded.is_empty() { Ok(Outcome::Done) } else { Err(Failure::Failed(exceeded.join("\n"))) }
-}
-
-/// Every channel of both files.
-fn channels(args: &CompareArgs) -> Result<Vec<Channel>, Failure> {
-    let read =
-        |path: &Path| read_picture_channels(path).map_err(|e| Failure::BadInput(e.to_string()));
-    let (a, b) = (read(&args.picture)?, read(&args.reference)?);
-    // Their pixels are the same: that was looked at before.
-    let lacking = |of: &PictureChannels, other: &PictureChannels, path: &Path| {
-        let has = |name: &str| of.channels.iter().any(|(n, _)| n == name);
-        let names = other.channels.iter().map(|(name, _)| name).filter(|name| !has(name));
-        let names: Vec<&str> = names.map(String::as_str).collect();
-        (!names.is_empty()).then(|| format!("{} lacks {}", path.display(), names.join(", ")))
-    };
-    let lacks: Vec<String> = [lacking(&a, &b, &args.picture), lacking(&b, &a, &args.reference)]
-        .into_iter()
-        .flatten()
-        .collect();
-    if !lacks.is_empty() {
-        let message =
-            format!("--channels: {}; accepted: files of the same channels", lacks.join("; "));
-        return Err(Failure::BadInput(message));
-    }
-    let channel = |(name, values): &(String, Vec<f32>)| {
-        let (_, other) = b.channels.iter().find(|(n, _)| n == name)?;
-        let found = compare_channel(values, other, a.extent[0]);
-        Some(Channel {
-            name: name.clone(),
-            mse: found.mse,
-            mae: found.mae,
-            relmse: found.rel_mse,
-            max: found.largest,
-            max_at: found.largest_at,
-            non_finite: found.non_finite,
-        })
-    };
-    Ok(a.channels.iter().filter_map(channel).collect())
-}
-
-fn print_channels(channels: &[Channel]) {
-    if channels.is_empty() {
-        return;
-    }
-    print(&format!(
-        "\n{:>22}{:>14}{:>14}{:>14}{:>14}{:>12}",
-        "channel", "mse", "mae", "relmse", "max", "non-finite"
-    ));
-    for c in channels {
-        print(&format!(
-            "{:>22}{:>14}{:>14}{:>14}{:>14}{:>12}",
-            c.name,
-            digits(c.mse),
-            digits(c.mae),
-            digits(c.relmse),
-            digits(c.max),
-            c.non_finite
-        ));
-    }
 }
 
 fn kind(path: &Path) -> Result<Difference<'_>, Failure> {
@@ -180,34 +121,6 @@ fn kind(path: &Path) -> Result<Difference<'_>, Failure> {
     }
 }
 
-/// A line for each limit that the pictures exceed. A metric that is undefined exceeds any.
-fn exceeded(args: &CompareArgs, found: &Comparison) -> Vec<String> {
-    let limits = [
-        ("mse", found.mse, args.max_mse),
-        ("mae", found.mae, args.max_mae),
-        ("relmse", found.rel_mse, args.max_relmse),
-        ("flip", found.flip, args.max_flip),
-        ("hdr-flip", found.hdr_flip.map_or(f64::NAN, |(mean, _)| mean), args.max_hdr_flip),
-    ];
-    let given = || limits.iter().filter_map(|&(name, value, limit)| Some((name, value, limit?)));
-    let mut lines: Vec<String> = given()
-        .filter(|&(_, value, limit)| !(value <= limit))
-        .map(|(name, value, limit)| {
-            let (value, limit) = (digits(value), digits(limit));
-            format!("{}: {name} is {value}, more than {limit}", args.picture.display())
-        })
-        .collect();
-    if found.non_finite > 0 && given().next().is_some() {
-        lines.push(format!(
-            "{} or {}: {} pixels are NaN or infinite, more than 0",
-            args.picture.display(),
-            args.reference.display(),
-            grouped(found.non_finite)
-        ));
-    }
-    lines
-}
-
 /// Six digits, and a power of ten where a plain number would be long.
 fn digits(value: f64) -> String {
     if value.is_nan() {
@@ -219,7 +132,7 @@ fn digits(value: f64) -> String {
     }
 }
 
-fn print_table(args: &CompareArgs, found: &Comparison) {
+fn print_table(args: &CompareArgs, found: &Comparison, others: &Unequal) {
     let line = |name: &str, value: String| print(&format!("{name:>10}  {value}"));
     let [width, height] = found.size;
     line(
@@ -244,13 +157,17 @@ fn print_table(args: &CompareArgs, found: &Comparison) {
         line("hdr-flip", digits(mean) + &exposures);
     }
     line("non-finite", format!("{} pixels", grouped(found.non_finite)));
+    if let Some(told) = others.told(args) {
+        line("channels", told);
+    }
 }
 
 fn write_json(
     path: &Path,
     args: &CompareArgs,
     found: &Comparison,
-    channels: Option<Vec<Channel>>,
+    others: &Unequal,
+    rows: Option<&Rows>,
     passed: bool,
 ) -> Result<(), Failure> {
     let report = Report {
@@ -267,7 +184,10 @@ fn write_json(
         hdr_flip: found.hdr_flip.map(|(mean, _)| mean),
         hdr_flip_exposures: found.hdr_flip.map(|(_, e)| [e.first, e.last]),
         non_finite: found.non_finite,
-        channels,
+        only_in_picture: &others.only_in_picture,
+        only_in_reference: &others.only_in_reference,
+        channels: rows.map(|rows| rows.channels.as_slice()),
+        layers: rows.map(|rows| rows.layers.as_slice()),
         passed,
     };
     let text = serde_json::to_string_pretty(&report)
