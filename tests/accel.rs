@@ -17,7 +17,7 @@ use alhazen::scene::{
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
 mod common;
-use common::Random;
+use common::{Random, ball};
 
 /// Every kind but the oracle, with its name.
 fn hierarchies(world: &World, precision: Precision) -> Vec<(&'static str, Box<dyn RayQuery>)> {
@@ -33,36 +33,6 @@ fn boxed(world: &World, kind: AccelKind, precision: Precision) -> Box<dyn RayQue
         Accel::Bvh(accel) => Box::new(accel),
         Accel::Brute(accel) => Box::new(accel),
     }
-}
-
-/// A closed ball of triangles with a bumpy surface.
-fn ball(rings: u32, center: DVec3, radius: f64, bumps: f64) -> TriangleMesh {
-    let sectors = 2 * rings;
-    let mut xyz = Vec::new();
-    for i in 0..=rings {
-        for j in 0..sectors {
-            let theta = std::f64::consts::PI * f64::from(i) / f64::from(rings);
-            let phi = std::f64::consts::TAU * f64::from(j) / f64::from(sectors);
-            let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
-            // One point at each pole.
-            let wave =
-                if i == 0 || i == rings { 0.0 } else { (5.0 * theta).sin() * (4.0 * phi).sin() };
-            let p = center + d * radius * (1.0 + bumps * wave);
-            xyz.extend(p.as_vec3().to_array());
-        }
-    }
-    let at = |i: u32, j: u32| match i {
-        0 => 0,
-        i if i == rings => rings * sectors,
-        i => i * sectors + j % sectors,
-    };
-    let quads = (0..rings).flat_map(|i| (0..sectors).map(move |j| (i, j)));
-    let triangles = quads.flat_map(|(i, j)| {
-        let (a, b, c, d) = (at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
-        [[a, b, c], [a, c, d]]
-    });
-    let triangles = triangles.filter(|[a, b, c]| a != b && b != c && a != c).collect();
-    TriangleMesh::new(xyz, triangles)
 }
 
 fn triangle_soup(random: &mut Random, n: usize) -> TriangleMesh {
@@ -466,13 +436,7 @@ fn no_ray_of_one_hits_the_surface_that_it_leaves(accelerator: AccelKind) {
                 let Some(hit) = accel.intersect(&ray) else { continue };
                 hits += 1;
                 let point = scene.surface(&ray, &hit);
-                // Uniform over the hemisphere, one in four nearly grazing.
-                let n = point.geometric_normal.as_dvec3();
-                let mut d = random.direction();
-                if random.unit() < 0.25 {
-                    d -= n * d.dot(n) * random.between(0.999, 1.0);
-                }
-                let d = if d.dot(n) < 0.0 { -d } else { d }.normalize().as_vec3();
+                let d = random.outward(point.geometric_normal.as_dvec3()).as_vec3();
                 // Rounding may turn a tangent inward; integrators refuse it.
                 if d.dot(point.geometric_normal) <= 0.0 {
                     continue;

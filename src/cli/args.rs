@@ -516,7 +516,8 @@ fn layer_names() -> impl TypedValueParser<Value = LayerName> {
 }
 
 /// A limit of a metric.
-fn parse_limit(text: &str) -> Result<f64, String> {
+/// A number that is not negative.
+pub(super) fn parse_limit(text: &str) -> Result<f64, String> {
     let limit = text.trim().parse().ok().filter(|x: &f64| x.is_finite() && *x >= 0.0);
     limit.ok_or_else(|| "expected a number that is not negative".to_owned())
 }

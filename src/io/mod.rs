@@ -52,7 +52,7 @@ pub use mesh::{MeshFile, NonFinite, read_mesh};
 pub use mesh_write::write_mesh;
 pub use mistakes::{Mistake, Mistakes};
 pub use output::{Attribute, AttributeValue, check_writable, remove_unfinished, write_text};
-pub use picture::{read_channel_names, read_picture, read_picture_channels, read_png};
+pub use picture::{PictureFile, read_picture, read_png};
 pub use png::{ToneMap, png_bytes, write_png};
 pub use radiance::write_hdr;
 pub use scene_file::{LoadError, LoadOptions, LoadedScene, load_scene};

@@ -12,50 +12,73 @@ use crate::film::Picture;
 /// Most pixels of a picture that is read: a file of some kilobytes may truly hold more, all black.
 const MOST_PIXELS: u64 = 1 << 28;
 
-/// Reads an EXR or a PNG file, whichever its first bytes say it is, as [`super::read_exr`] and
-/// [`read_png`] do.
+/// An EXR or a PNG file, whichever its first bytes say it is, read once.
+pub struct PictureFile<'a> {
+    path: &'a Path,
+    bytes: Vec<u8>,
+    is_exr: bool,
+}
+
+impl<'a> PictureFile<'a> {
+    /// Reads it.
+    ///
+    /// # Errors
+    /// [`ReadError`] where it cannot be read, or is neither.
+    pub fn read(path: &'a Path) -> Result<Self, ReadError> {
+        let bytes = Source::open(path)?.read_from(0)?;
+        let is_exr = bytes.starts_with(&exr_read::SIGNATURE);
+        if !is_exr && !bytes.starts_with(&image::PNG_SIGNATURE) {
+            return Err(ReadError::file(path, "unknown kind of picture; accepted: EXR, PNG"));
+        }
+        Ok(Self { path, bytes, is_exr })
+    }
+
+    /// Its colours, as [`super::read_exr`] and [`read_png`] give them.
+    ///
+    /// # Errors
+    /// [`ReadError`] where it is not sound.
+    pub fn picture(&self) -> Result<Picture, ReadError> {
+        if self.is_exr {
+            exr_read::decode(self.path, &self.bytes)
+        } else {
+            decode_png(self.path, &self.bytes)
+        }
+    }
+
+    /// All channels of an EXR file, or the three colours of a PNG file.
+    ///
+    /// # Errors
+    /// [`ReadError`] where it is not sound, or is an EXR file of several parts.
+    pub fn channels(&self) -> Result<PictureChannels, ReadError> {
+        if self.is_exr {
+            return exr_read::decode_channels(self.path, &self.bytes);
+        }
+        let Picture { extent, origin, pixels, .. } = self.picture()?;
+        let values = |i: usize| pixels.iter().map(|c| c.to_array()[i]).collect();
+        let colours = COLOURS.into_iter().enumerate();
+        let channels = colours.map(|(i, name)| (name.to_owned(), values(i))).collect();
+        Ok(PictureChannels { extent, origin, channels, attributes: Vec::new() })
+    }
+
+    /// The names of what [`PictureFile::channels`] gives.
+    ///
+    /// # Errors
+    /// As it.
+    pub fn channel_names(&self) -> Result<Vec<String>, ReadError> {
+        if self.is_exr {
+            exr_read::decode_channel_names(self.path, &self.bytes)
+        } else {
+            Ok(COLOURS.map(str::to_owned).into())
+        }
+    }
+}
+
+/// Reads the colours of an EXR or a PNG file.
 ///
 /// # Errors
 /// [`ReadError`] where it cannot be read, is neither, or is not sound.
 pub fn read_picture(path: &Path) -> Result<Picture, ReadError> {
-    let bytes = Source::open(path)?.read_from(0)?;
-    if bytes.starts_with(&exr_read::SIGNATURE) {
-        exr_read::decode(path, &bytes)
-    } else if bytes.starts_with(&image::PNG_SIGNATURE) {
-        decode_png(path, &bytes)
-    } else {
-        Err(ReadError::file(path, "unknown kind of picture; accepted: EXR, PNG"))
-    }
-}
-
-/// Reads all channels of an EXR file, or the three colours of a PNG file as [`read_png`] does.
-///
-/// # Errors
-/// [`ReadError`] where it cannot be read, is neither, or is not sound, or where it is an EXR file of several
-/// parts.
-pub fn read_picture_channels(path: &Path) -> Result<PictureChannels, ReadError> {
-    let bytes = Source::open(path)?.read_from(0)?;
-    if bytes.starts_with(&exr_read::SIGNATURE) {
-        return exr_read::decode_channels(path, &bytes);
-    }
-    let Picture { extent, origin, pixels, .. } = read_picture(path)?;
-    let colours = COLOURS.into_iter().enumerate();
-    let values = |i: usize| pixels.iter().map(|c| c.to_array()[i]).collect();
-    let channels = colours.map(|(i, name)| (name.to_owned(), values(i))).collect();
-    Ok(PictureChannels { extent, origin, channels, attributes: Vec::new() })
-}
-
-/// The names of the channels that [`read_picture_channels`] gives.
-///
-/// # Errors
-/// As it.
-pub fn read_channel_names(path: &Path) -> Result<Vec<String>, ReadError> {
-    let bytes = Source::open(path)?.read_from(0)?;
-    if bytes.starts_with(&exr_read::SIGNATURE) {
-        exr_read::decode_channel_names(path, &bytes)
-    } else {
-        Ok(COLOURS.map(str::to_owned).into())
-    }
+    PictureFile::read(path)?.picture()
 }
 
 /// The channels of a picture that has only colours.

@@ -23,38 +23,81 @@ pub struct ChannelComparison {
     pub largest_at: [u32; 2],
 }
 
-/// Compares the values of a channel with those of a reference, row by row of `width` pixels.
-pub fn compare_channel(a: &[f32], b: &[f32], width: u32) -> ChannelComparison {
-    let (mut count, mut non_finite) = (0u64, 0u64);
-    let (mut square, mut absolute, mut relative, mut clipped) = (0.0, 0.0, 0.0, 0.0);
-    let mut largest = (0.0f64, 0usize);
-    for (i, (&a, &b)) in a.iter().zip(b).enumerate() {
-        if !(a.is_finite() && b.is_finite()) {
-            non_finite += u64::from(a != b);
-            continue;
-        }
+/// Sums over values that are finite in both.
+#[derive(Clone, Copy)]
+pub(super) struct Sums {
+    pub(super) count: u64,
+    square: f64,
+    absolute: f64,
+    relative: f64,
+    /// Squared, of both clipped to [0, 1].
+    clipped: f64,
+    /// The largest difference and the index of its pixel.
+    largest: (f64, usize),
+}
+
+impl Sums {
+    pub(super) const NONE: Self = Self {
+        count: 0,
+        square: 0.0,
+        absolute: 0.0,
+        relative: 0.0,
+        clipped: 0.0,
+        largest: (0.0, 0),
+    };
+
+    /// Adds a value of the pixel `index` and that of the reference.
+    pub(super) fn add(&mut self, index: usize, a: f32, b: f32) {
         let (a, b) = (f64::from(a), f64::from(b));
         let d = a - b;
-        count += 1;
-        square += d * d;
-        absolute += d.abs();
-        relative += d * d / (b * b + 0.01);
-        clipped += (a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0)).powi(2);
-        if d.abs() > largest.0 {
-            largest = (d.abs(), i);
+        self.count += 1;
+        self.square += d * d;
+        self.absolute += d.abs();
+        self.relative += d * d / (b * b + 0.01);
+        self.clipped += (a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0)).powi(2);
+        if d.abs() > self.largest.0 {
+            self.largest = (d.abs(), index);
         }
     }
-    let mean = |sum: f64| sum / count as f64;
-    ChannelComparison {
-        count,
-        non_finite,
-        mse: mean(square),
-        mae: mean(absolute),
-        rel_mse: mean(relative),
-        psnr: -10.0 * mean(clipped).log10(),
-        largest: if count == 0 { f64::NAN } else { largest.0 },
-        largest_at: pixel(largest.1, width),
+
+    pub(super) fn join(self, other: Self) -> Self {
+        Self {
+            count: self.count + other.count,
+            square: self.square + other.square,
+            absolute: self.absolute + other.absolute,
+            relative: self.relative + other.relative,
+            clipped: self.clipped + other.clipped,
+            largest: if other.largest.0 > self.largest.0 { other.largest } else { self.largest },
+        }
     }
+
+    /// What they come to, row by row of `width` pixels.
+    pub(super) fn compared(&self, non_finite: u64, width: u32) -> ChannelComparison {
+        let mean = |sum: f64| sum / self.count as f64;
+        ChannelComparison {
+            count: self.count,
+            non_finite,
+            mse: mean(self.square),
+            mae: mean(self.absolute),
+            rel_mse: mean(self.relative),
+            psnr: -10.0 * mean(self.clipped).log10(),
+            largest: if self.count == 0 { f64::NAN } else { self.largest.0 },
+            largest_at: pixel(self.largest.1, width),
+        }
+    }
+}
+
+/// Compares the values of a channel with those of a reference, row by row of `width` pixels.
+pub fn compare_channel(a: &[f32], b: &[f32], width: u32) -> ChannelComparison {
+    let (mut sums, mut non_finite) = (Sums::NONE, 0);
+    for (i, (&a, &b)) in a.iter().zip(b).enumerate() {
+        if a.is_finite() && b.is_finite() {
+            sums.add(i, a, b);
+        } else {
+            non_finite += u64::from(a != b);
+        }
+    }
+    sums.compared(non_finite, width)
 }
 
 /// What the channels of a layer come to together.

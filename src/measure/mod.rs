@@ -11,6 +11,7 @@ pub mod trade;
 
 use rayon::prelude::*;
 
+use channel::Sums;
 pub use channel::{ChannelComparison, compare_channel, compare_layer, count_differing};
 pub use flip::{Exposures, PIXELS_PER_DEGREE, flip, hdr_flip};
 
@@ -88,58 +89,6 @@ pub fn check_same_pixels(a: &Picture, b: &Picture) -> Result<(), Unequal> {
     }
 }
 
-/// Sums over some rows.
-#[derive(Clone, Copy)]
-struct Sums {
-    pixels: u64,
-    square: f64,
-    absolute: f64,
-    relative: f64,
-    clipped: f64,
-    /// The largest difference and the index of its pixel.
-    largest: (f64, usize),
-}
-
-impl Sums {
-    const NONE: Self = Self {
-        pixels: 0,
-        square: 0.0,
-        absolute: 0.0,
-        relative: 0.0,
-        clipped: 0.0,
-        largest: (0.0, 0),
-    };
-
-    fn add(&mut self, index: usize, a: Rgb, b: Rgb) {
-        if !(a.is_finite() && b.is_finite()) {
-            return;
-        }
-        self.pixels += 1;
-        for (a, b) in a.to_array().into_iter().zip(b.to_array()) {
-            let (a, b) = (f64::from(a), f64::from(b));
-            let d = a - b;
-            self.square += d * d;
-            self.absolute += d.abs();
-            self.relative += d * d / (b * b + 0.01);
-            self.clipped += (a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0)).powi(2);
-            if d.abs() > self.largest.0 {
-                self.largest = (d.abs(), index);
-            }
-        }
-    }
-
-    fn join(self, other: Self) -> Self {
-        Self {
-            pixels: self.pixels + other.pixels,
-            square: self.square + other.square,
-            absolute: self.absolute + other.absolute,
-            relative: self.relative + other.relative,
-            clipped: self.clipped + other.clipped,
-            largest: if other.largest.0 > self.largest.0 { other.largest } else { self.largest },
-        }
-    }
-}
-
 /// Compares the picture `a` with the reference `b`. The result does not depend on the number of threads.
 ///
 /// # Errors
@@ -155,8 +104,12 @@ pub fn compare(a: &Picture, b: &Picture, options: &CompareOptions) -> Result<Com
         .enumerate()
         .map(|(y, (a, b))| {
             let mut sums = Sums::NONE;
-            for (x, (&a, &b)) in a.iter().zip(b).enumerate() {
-                sums.add(y * width + x, a, b);
+            for (x, (a, b)) in
+                a.iter().zip(b).enumerate().filter(|(_, (a, b))| a.is_finite() && b.is_finite())
+            {
+                for (a, b) in a.to_array().into_iter().zip(b.to_array()) {
+                    sums.add(y * width + x, a, b);
+                }
             }
             sums
         })
@@ -164,11 +117,11 @@ pub fn compare(a: &Picture, b: &Picture, options: &CompareOptions) -> Result<Com
     // One after the other, so that rounding is the same on any number of threads.
     let sums = rows.into_iter().fold(Sums::NONE, Sums::join);
     let total = a.pixels.len().min(b.pixels.len()) as u64;
-    let mean = |sum: f64| sum / (3 * sums.pixels) as f64;
-    let at = sums.largest.1;
+    let pixels = sums.count / 3;
+    let values = sums.compared(total - pixels, size[0]);
 
     let sound = |i: usize| a.pixels[i].is_finite() && b.pixels[i].is_finite();
-    let all_sound = sums.pixels == total;
+    let all_sound = pixels == total;
     let blackened = |pixels: &[Rgb]| -> Vec<Rgb> {
         let value = |(i, &c): (usize, &Rgb)| if sound(i) { c } else { Rgb::BLACK };
         pixels.iter().enumerate().map(value).collect()
@@ -180,7 +133,7 @@ pub fn compare(a: &Picture, b: &Picture, options: &CompareOptions) -> Result<Com
     };
     let map_mean = |map: &[f32]| {
         let values = map.iter().enumerate().filter(|&(i, _)| all_sound || sound(i));
-        values.map(|(_, &x)| f64::from(x)).sum::<f64>() / sums.pixels as f64
+        values.map(|(_, &x)| f64::from(x)).sum::<f64>() / pixels as f64
     };
     let mut flip_map = flip(test, reference, size, options.pixels_per_degree);
     let flip_mean = map_mean(&flip_map);
@@ -197,13 +150,13 @@ pub fn compare(a: &Picture, b: &Picture, options: &CompareOptions) -> Result<Com
     });
     Ok(Comparison {
         size,
-        non_finite: total - sums.pixels,
-        mse: mean(sums.square),
-        mae: mean(sums.absolute),
-        rel_mse: mean(sums.relative),
-        psnr: -10.0 * mean(sums.clipped).log10(),
-        largest: if sums.pixels == 0 { f64::NAN } else { sums.largest.0 },
-        largest_at: [(at % width) as u32, (at / width) as u32],
+        non_finite: values.non_finite,
+        mse: values.mse,
+        mae: values.mae,
+        rel_mse: values.rel_mse,
+        psnr: values.psnr,
+        largest: values.largest,
+        largest_at: values.largest_at,
         flip: flip_mean,
         hdr_flip,
         flip_map,

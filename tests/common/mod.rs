@@ -8,8 +8,12 @@
 
 pub mod optics;
 
+use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+use alhazen::geometry::TriangleMesh;
+use glam::DVec3;
 
 /// The folder of assets made by other people, if this machine has it: `ALHAZEN_ASSETS`, or
 /// `../shared/data`. Where it is missing, one line says that the test did not run.
@@ -93,7 +97,7 @@ impl Random {
         (self.unit() * n as f64) as usize
     }
 
-    pub fn direction(&mut self) -> glam::DVec3 {
+    pub fn direction(&mut self) -> DVec3 {
         loop {
             let v = self.in_cube();
             if v.length() > 0.01 && v.length() < 1.0 {
@@ -102,7 +106,46 @@ impl Random {
         }
     }
 
-    pub fn in_cube(&mut self) -> glam::DVec3 {
-        glam::DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
+    /// Of unit length, on the side of `normal`: uniform over the hemisphere, one in four nearly grazing.
+    pub fn outward(&mut self, normal: DVec3) -> DVec3 {
+        let mut d = self.direction();
+        if self.unit() < 0.25 {
+            d -= normal * d.dot(normal) * self.between(0.999, 1.0);
+        }
+        if d.dot(normal) < 0.0 { -d } else { d }.normalize()
     }
+
+    pub fn in_cube(&mut self) -> DVec3 {
+        DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
+    }
+}
+
+/// A closed ball of triangles, convex where it has no `bumps`.
+pub fn ball(rings: u32, center: DVec3, radius: f64, bumps: f64) -> TriangleMesh {
+    let sectors = 2 * rings;
+    let mut xyz = Vec::new();
+    for i in 0..=rings {
+        for j in 0..sectors {
+            let theta = PI * f64::from(i) / f64::from(rings);
+            let phi = TAU * f64::from(j) / f64::from(sectors);
+            let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            // One point at each pole.
+            let wave =
+                if i == 0 || i == rings { 0.0 } else { (5.0 * theta).sin() * (4.0 * phi).sin() };
+            let p = center + d * radius * (1.0 + bumps * wave);
+            xyz.extend(p.as_vec3().to_array());
+        }
+    }
+    let at = |i: u32, j: u32| match i {
+        0 => 0,
+        i if i == rings => rings * sectors,
+        i => i * sectors + j % sectors,
+    };
+    let quads = (0..rings).flat_map(|i| (0..sectors).map(move |j| (i, j)));
+    let triangles = quads.flat_map(|(i, j)| {
+        let (a, b, c, d) = (at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
+        [[a, b, c], [a, c, d]]
+    });
+    let triangles = triangles.filter(|[a, b, c]| a != b && b != c && a != c).collect();
+    TriangleMesh::new(xyz, triangles)
 }

@@ -9,9 +9,7 @@ use crate::cli::args::CompareArgs;
 use crate::cli::{Failure, print};
 use crate::color::Rgb;
 use crate::film::Picture;
-use crate::io::{
-    Attribute, AttributeValue, PictureChannels, read_channel_names, read_picture_channels,
-};
+use crate::io::{Attribute, AttributeValue, PictureChannels, PictureFile};
 use crate::measure::{
     ChannelComparison, CompareOptions, compare, compare_channel, compare_layer, count_differing,
 };
@@ -39,7 +37,7 @@ pub(super) struct Row {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rows {
     pub(super) channels: Vec<Row>,
-    /// Of those with a name and more than one channel.
+    /// Of those with a name.
     pub(super) layers: Vec<Row>,
 }
 
@@ -52,9 +50,8 @@ pub(super) struct Unequal {
 
 impl Unequal {
     /// Of two files. Nothing is known of those that hold several parts.
-    pub(super) fn of(args: &CompareArgs) -> Self {
-        let names = |path: &Path| read_channel_names(path).ok();
-        let (Some(a), Some(b)) = (names(&args.picture), names(&args.reference)) else {
+    pub(super) fn of(picture: &PictureFile<'_>, reference: &PictureFile<'_>) -> Self {
+        let (Ok(a), Ok(b)) = (picture.channel_names(), reference.channel_names()) else {
             return Self::default();
         };
         let only = |a: &[String], b: &[String]| {
@@ -78,14 +75,18 @@ impl Unequal {
 }
 
 /// Every channel and layer of both files, whose pixels are the same.
-pub(super) fn compared(args: &CompareArgs, unequal: &Unequal) -> Result<Rows, Failure> {
+pub(super) fn compared(
+    args: &CompareArgs,
+    [picture, reference]: [&PictureFile<'_>; 2],
+    unequal: &Unequal,
+) -> Result<Rows, Failure> {
     if let Some(told) = unequal.told(args) {
         let message = format!("--channels: {told}; accepted: files of the same channels");
         return Err(Failure::BadInput(message));
     }
-    let read =
-        |path: &Path| read_picture_channels(path).map_err(|e| Failure::BadInput(e.to_string()));
-    let (a, b) = (read(&args.picture)?, read(&args.reference)?);
+    let channels =
+        |of: &PictureFile<'_>| of.channels().map_err(|e| Failure::BadInput(e.to_string()));
+    let (a, b) = (channels(picture)?, channels(reference)?);
     let width = a.extent[0];
     let cryptomattes = cryptomattes(&b.attributes);
     let mut rows = Rows::default();
@@ -112,17 +113,15 @@ pub(super) fn compared(args: &CompareArgs, unequal: &Unequal) -> Result<Rows, Fa
         }
     }
     for layer in layers.into_iter().filter(|layer| !layer.name.is_empty()) {
-        let mut found = row(layer.name, &compare_layer(&layer.channels), false);
+        let looks = colours(&a, layer.name).zip(colours(&b, layer.name));
+        let looks = looks.filter(|_| layer.differing.is_none());
+        let mut found = row(layer.name, &compare_layer(&layer.channels), looks.is_some());
         if layer.channels.is_empty() {
             found = Row { name: layer.name.to_owned(), ..Row::default() };
         }
         found.differing = layer.differing;
-        if let (Some(a), Some(b)) = (colours(&a, layer.name), colours(&b, layer.name))
-            && layer.differing.is_none()
-            && let Ok(looks) = compare(&a, &b, &CompareOptions::default())
-        {
-            (found.psnr, found.flip) = (Some(looks.psnr), Some(looks.flip));
-        }
+        let compared = looks.map(|(a, b)| compare(&a, &b, &CompareOptions::default()));
+        found.flip = compared.and_then(Result::ok).map(|looks| looks.flip);
         rows.layers.push(found);
     }
     Ok(rows)

@@ -3,7 +3,7 @@
 use super::channels::{Row, Rows};
 use super::digits;
 use crate::cli::Failure;
-use crate::cli::args::CompareArgs;
+use crate::cli::args::{CompareArgs, parse_limit};
 use crate::cli::units::grouped;
 use crate::measure::Comparison;
 
@@ -28,9 +28,7 @@ pub(in crate::cli) fn parse_channel_limit(text: &str) -> Result<ChannelLimit, St
     let (what, limit) = text.rsplit_once('=').ok_or_else(form)?;
     let (name, metric) = what.rsplit_once(':').ok_or_else(form)?;
     let metric = METRICS.into_iter().find(|known| *known == metric).ok_or_else(form)?;
-    let limit = limit.trim().parse().ok().filter(|x: &f64| x.is_finite() && *x >= 0.0);
-    let limit = limit.ok_or_else(|| "expected a number that is not negative".to_owned())?;
-    Ok(ChannelLimit { name: name.to_owned(), metric, limit })
+    Ok(ChannelLimit { name: name.to_owned(), metric, limit: parse_limit(limit)? })
 }
 
 /// A metric beside what it may be.

@@ -15,7 +15,8 @@ use super::units::grouped;
 use super::{Failure, Outcome, print};
 use crate::film::{Film, Layers, Picture, PixelRect};
 use crate::io::{
-    ExrOptions, PixelType, ToneMap, WriteError, read_picture, write_exr, write_png, write_text,
+    ExrOptions, PictureFile, PixelType, ReadError, ToneMap, WriteError, write_exr, write_png,
+    write_text,
 };
 use crate::measure::{
     CompareOptions, Comparison, absolute_difference, check_same_pixels, compare as measure, magma,
@@ -64,8 +65,10 @@ pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
     let difference = args.difference.as_deref().map(kind).transpose()?;
     let read = [args.picture.as_path(), args.reference.as_path()];
     check_targets(read, args.difference.iter().chain(&args.json))?;
-    let read = |path: &Path| read_picture(path).map_err(|e| Failure::BadInput(e.to_string()));
-    let (a, b) = (read(&args.picture)?, read(&args.reference)?);
+    let bad = |e: ReadError| Failure::BadInput(e.to_string());
+    let picture = PictureFile::read(&args.picture).map_err(bad)?;
+    let reference = PictureFile::read(&args.reference).map_err(bad)?;
+    let (a, b) = (picture.picture().map_err(bad)?, reference.picture().map_err(bad)?);
     let unequal = |e| {
         let (a, b) = (args.picture.display(), args.reference.display());
         Failure::BadInput(format!("{a} and {b} do not show the same pixels: {e}"))
@@ -75,9 +78,10 @@ pub(super) fn compare(args: &CompareArgs) -> Result<Outcome, Failure> {
         hdr_flip: args.hdr_flip || args.max_hdr_flip.is_some(),
         ..CompareOptions::default()
     };
-    let others = Unequal::of(args);
+    let others = Unequal::of(&picture, &reference);
     let by_channel = args.channels || !args.limit.is_empty();
-    let rows = by_channel.then(|| channels::compared(args, &others)).transpose()?;
+    let files = [&picture, &reference];
+    let rows = by_channel.then(|| channels::compared(args, files, &others)).transpose()?;
     let found = measure(&a, &b, &options).map_err(unequal)?;
     let none = Rows::default();
     let exceeded = limits::exceeded(args, &found, rows.as_ref().unwrap_or(&none))?;

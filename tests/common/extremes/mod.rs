@@ -11,7 +11,6 @@ mod refraction;
 mod surfaces;
 mod triangles;
 
-use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::time::Instant;
 
@@ -19,12 +18,14 @@ use alhazen::accel::{Accel, AccelKind, BuildOptions, Precision, World};
 use alhazen::camera::Projection;
 use alhazen::color::Rgb;
 use alhazen::film::Filter;
-use alhazen::geometry::TriangleMesh;
+use alhazen::geometry::{Quadric, TriangleMesh};
 use alhazen::material::Material;
+use alhazen::math::Bounds;
 use alhazen::scene::{
-    CameraDesc, Location, MaterialDesc, ObjectDesc, PlaceDesc, Scene, SceneDesc, ShapeDesc,
+    CameraDesc, Location, MaterialDesc, ObjectDesc, PlaceDesc, PrototypeDesc, Reference, Scene,
+    SceneDesc, ShapeDesc,
 };
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// What a rung of an accelerator came to.
 pub struct Cell {
@@ -163,28 +164,7 @@ fn power(x: f64) -> String {
 
 /// A closed, convex ball of triangles.
 fn ball(rings: u32, center: DVec3, radius: f64) -> TriangleMesh {
-    let sectors = 2 * rings;
-    let mut xyz = Vec::new();
-    for i in 0..=rings {
-        for j in 0..sectors {
-            let theta = PI * f64::from(i) / f64::from(rings);
-            let phi = TAU * f64::from(j) / f64::from(sectors);
-            let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
-            xyz.extend((center + d * radius).as_vec3().to_array());
-        }
-    }
-    let at = |i: u32, j: u32| match i {
-        0 => 0,
-        i if i == rings => rings * sectors,
-        i => i * sectors + j % sectors,
-    };
-    let quads = (0..rings).flat_map(|i| (0..sectors).map(move |j| (i, j)));
-    let triangles = quads.flat_map(|(i, j)| {
-        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-        [[a, c, b], [a, d, c]]
-    });
-    let triangles = triangles.filter(|[a, b, c]| a != b && b != c && a != c);
-    TriangleMesh::new(xyz, triangles.collect())
+    crate::common::ball(rings, center, radius, 0.0)
 }
 
 /// An object made of a mesh.
@@ -192,6 +172,22 @@ fn add_mesh(desc: &mut SceneDesc, mesh: TriangleMesh) {
     desc.meshes.push(mesh);
     let shape = ShapeDesc::Mesh(desc.meshes.len() - 1);
     desc.objects.push(ObjectDesc::new(shape, Some("grey")));
+}
+
+/// Copies of an object.
+fn add_copies(desc: &mut SceneDesc, object: ObjectDesc, transforms: Vec<DAffine3>) {
+    let (name, at) = ("copied".to_owned(), Location::default());
+    desc.prototypes.push(PrototypeDesc { name, at, objects: vec![object] });
+    let shape = ShapeDesc::Instances { prototype: Reference::new("copied"), transforms };
+    desc.objects.push(ObjectDesc::new(shape, None));
+}
+
+/// Where k·(p − `center`)² = 1, all of which lies in `bounds`.
+fn ellipsoid(k: DVec3, center: DVec3, bounds: Bounds) -> ShapeDesc {
+    let linear = k * center * -2.0;
+    let constant = -0.5 * linear.dot(center) - 1.0;
+    let [x, y, z] = linear.to_array();
+    ShapeDesc::Quadric(Quadric::new([k.x, k.y, k.z, 0.0, 0.0, 0.0, x, y, z, constant], bounds))
 }
 
 fn look(eye: DVec3, target: DVec3, fov: f64) -> CameraDesc {

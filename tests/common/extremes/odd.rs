@@ -8,13 +8,10 @@ use alhazen::io::read_mesh;
 use alhazen::light::Falloff;
 use alhazen::material::{Dielectric, FresnelModel, Ior, Material};
 use alhazen::render::{RenderJob, render};
-use alhazen::scene::{
-    LightDesc, Location, MaterialDesc, ObjectDesc, PrototypeDesc, Reference, Scene, SceneDesc,
-    ShapeDesc,
-};
+use alhazen::scene::{LightDesc, MaterialDesc, ObjectDesc, Reference, Scene, SceneDesc, ShapeDesc};
 use glam::{DAffine3, DQuat, DVec3};
 
-use super::{Cell, Rung, Table, add_mesh, empty, look, power, row, sphere};
+use super::{Cell, Rung, Table, add_copies, add_mesh, empty, look, power, row, sphere};
 
 /// A disk of reflectance 0.5 under a sun straight above with irradiance π·`light`: radiance 0.5·`light`.
 fn lit(light: f64) -> SceneDesc {
@@ -28,13 +25,15 @@ fn lit(light: f64) -> SceneDesc {
     desc
 }
 
-/// A scene of which nothing may be seen: a mesh read from a file, above the floor.
+/// With a mesh read from a file, of which one triangle alone is sound.
 fn with_file(vertices: &str, faces: &str) -> SceneDesc {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("odd.obj");
     std::fs::write(&path, format!("{vertices}{faces}")).unwrap();
+    let mesh = read_mesh(&path).unwrap().mesh;
+    assert_eq!(mesh.triangles.len(), 1, "the others are left out");
     let mut desc = lit(1.0);
-    add_mesh(&mut desc, read_mesh(&path).unwrap().mesh);
+    add_mesh(&mut desc, mesh);
     desc
 }
 
@@ -117,7 +116,7 @@ pub(super) fn odd_scenes() -> Table {
             desc.objects.push(ObjectDesc {
                 transform: DAffine3::from_scale_rotation_translation(
                     DVec3::splat(1e-30),
-                    glam::DQuat::IDENTITY,
+                    DQuat::IDENTITY,
                     DVec3::Y,
                 ),
                 ..sphere(DVec3::ZERO, 1.0)
@@ -129,14 +128,10 @@ pub(super) fn odd_scenes() -> Table {
     );
     let copied = |size: f64| {
         let mut desc = lit(1.0);
-        let (name, at) = ("dust".to_owned(), Location::default());
-        let objects = vec![sphere(DVec3::ZERO, 1.0)];
-        desc.prototypes.push(PrototypeDesc { name, at, objects });
         let (scale, turn) = (DVec3::splat(size), DQuat::IDENTITY);
         let place = |y: f64| DAffine3::from_scale_rotation_translation(scale, turn, DVec3::Y * y);
-        let transforms = (1..4).map(|i| place(f64::from(i))).collect();
-        let shape = ShapeDesc::Instances { prototype: Reference::new("dust"), transforms };
-        desc.objects.push(ObjectDesc::new(shape, None));
+        let places = (1..4).map(|i| place(f64::from(i))).collect();
+        add_copies(&mut desc, sphere(DVec3::ZERO, 1.0), places);
         desc
     };
     add("instances of size 10⁻⁹ in the way", &|| copied(1e-9), 0.5, ROUNDED);

@@ -16,7 +16,7 @@ use alhazen::scene::{
 };
 use glam::{DAffine3, DVec3};
 
-use super::{Cell, Rung, Table, ball, empty, look, power, row, sphere};
+use super::{Cell, Rung, Table, add_mesh, ball, empty, look, power, row, sphere};
 
 /// Something of each kind, lit and shadowed, `scale` times as large and moved by `offset`.
 fn still_life(scale: f64, offset: DVec3) -> SceneDesc {
@@ -26,8 +26,7 @@ fn still_life(scale: f64, offset: DVec3) -> SceneDesc {
     desc.settings.samples = 4;
     let mut mesh = ball(24, DVec3::ZERO, 0.6 * scale);
     mesh.origin = at(-0.8, 0.6, 0.0);
-    desc.meshes.push(mesh);
-    desc.objects.push(ObjectDesc::new(ShapeDesc::Mesh(0), Some("grey")));
+    add_mesh(&mut desc, mesh);
     desc.materials.push(MaterialDesc::new(
         "mirror",
         Material::Mirror { reflectance: Rgb::splat(0.9), fresnel: None },

@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use alhazen::accel::{Geometry, Hit, affine_from_rows};
 use alhazen::geometry::grid::Grid;
-use alhazen::geometry::{Expression, Implicit, Isosurface, Polygon, Quadric};
+use alhazen::geometry::{Expression, Implicit, Isosurface, Polygon};
 use alhazen::math::{Bounds, Ray};
-use alhazen::scene::{ObjectDesc, Scene, ShapeDesc};
-use glam::{DAffine3, DVec3};
+use alhazen::scene::{ObjectDesc, Scene, SceneDesc, ShapeDesc};
+use glam::{DAffine3, DQuat, DVec3, EulerRot};
 
-use super::surfaces::add_copy;
-use super::{Cell, Rung, Table, add_mesh, ball, empty, row, sphere};
+use super::{Cell, Rung, Table, add_copies, add_mesh, ball, ellipsoid, empty, row, sphere};
 use crate::common::Random;
 
 /// A point's distance from one smooth part of a surface, to first order, and the normal there.
@@ -104,11 +103,8 @@ const KINDS: [Kind; 10] = [
         name: "ellipsoid (quadric)",
         curvature: 4.0,
         shape: |center, scale| {
-            let [xx, yy, zz] = [1.0, 2.0, 4.0].map(|x| x / (scale * scale));
-            let k = DVec3::new(xx, yy, zz) * center * -2.0;
-            let constant = -0.5 * k.dot(center) - 1.0;
-            let coefficients = [xx, yy, zz, 0.0, 0.0, 0.0, k.x, k.y, k.z, constant];
-            ShapeDesc::Quadric(Quadric::new(coefficients, cube(center, 2.0 * scale)))
+            let k = DVec3::new(1.0, 2.0, 4.0) / (scale * scale);
+            ellipsoid(k, center, cube(center, 2.0 * scale))
         },
         equation: |p| {
             let k = DVec3::new(1.0, 2.0, 4.0);
@@ -171,6 +167,14 @@ pub(super) fn corners(scene: &Scene, hit: &Hit) -> [DVec3; 3] {
     let corners = mesh.corners(hit.primitive as usize).map(|p| p.as_dvec3());
     let place = hit.copy.map(|copy| affine_from_rows(world.transform(copy)));
     place.map_or(corners, |m| corners.map(|p| m.transform_point3(p)))
+}
+
+/// A copy in odd proportions of an object at the origin, moved to `center`.
+pub(super) fn add_copy(desc: &mut SceneDesc, object: ObjectDesc, center: DVec3) {
+    let turned = DQuat::from_euler(EulerRot::XYZ, 0.4, 1.1, -0.7);
+    let stretch = DVec3::new(1.0, 2.0, 0.5);
+    let place = DAffine3::from_scale_rotation_translation(stretch, turned, center);
+    add_copies(desc, object, vec![place]);
 }
 
 /// What an object lies in: its centre, its size, and whether it is copied.

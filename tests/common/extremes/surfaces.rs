@@ -3,16 +3,15 @@
 use std::f64::consts::TAU;
 
 use alhazen::accel::{AccelKind, Hit, Precision};
-use alhazen::geometry::{Quadric, TriangleMesh};
+use alhazen::geometry::TriangleMesh;
 use alhazen::math::{Bounds, Ray};
-use alhazen::scene::{
-    Epsilon, Location, ObjectDesc, PrototypeDesc, Reference, Scene, SceneDesc, ShapeDesc,
-};
-use glam::{DAffine3, DQuat, DVec2, DVec3, EulerRot};
+use alhazen::scene::{Epsilon, ObjectDesc, Scene, SceneDesc, ShapeDesc};
+use glam::{DAffine3, DVec2, DVec3};
 
-use super::points::corners;
+use super::points::{add_copy, corners};
 use super::{
-    Cell, Row, Rung, Table, add_mesh, ball, empty, enter, look, per_million, power, row, sphere,
+    Cell, Row, Rung, Table, add_mesh, ball, ellipsoid, empty, enter, look, per_million, power, row,
+    sphere,
 };
 use crate::common::Random;
 
@@ -25,8 +24,7 @@ pub(super) fn far_cameras(n: usize) -> Table {
         row(format!("{shape} from {} radii", power(distance)), |rung| {
             let mut desc = empty();
             if is_mesh {
-                desc.meshes.push(ball(400, DVec3::ZERO, 1.0));
-                desc.objects.push(ObjectDesc::new(ShapeDesc::Mesh(0), Some("grey")));
+                add_mesh(&mut desc, ball(400, DVec3::ZERO, 1.0));
             } else {
                 desc.objects.push(sphere(DVec3::ZERO, 1.0));
             }
@@ -84,8 +82,7 @@ pub(super) fn grazing(n: usize) -> Table {
                 if is_mesh {
                     let xyz = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
                     let xyz = xyz.iter().flat_map(|[x, z]| [*x, 0.0, *z]).collect();
-                    desc.meshes.push(TriangleMesh::new(xyz, vec![[0, 2, 1], [0, 3, 2]]));
-                    desc.objects.push(ObjectDesc::new(ShapeDesc::Mesh(0), Some("grey")));
+                    add_mesh(&mut desc, TriangleMesh::new(xyz, vec![[0, 2, 1], [0, 3, 2]]));
                 } else {
                     let disk = ShapeDesc::Disk {
                         center: DVec3::ZERO,
@@ -159,50 +156,30 @@ pub(super) fn grazing(n: usize) -> Table {
     }
 }
 
-/// A copy in odd proportions of an object at the origin, moved to `center`.
-pub(super) fn add_copy(desc: &mut SceneDesc, object: ObjectDesc, center: DVec3) {
-    let (name, at) = ("copied".to_owned(), Location::default());
-    desc.prototypes.push(PrototypeDesc { name, at, objects: vec![object] });
-    let turned = DQuat::from_euler(EulerRot::XYZ, 0.4, 1.1, -0.7);
-    let stretch = DVec3::new(1.0, 2.0, 0.5);
-    let transforms = vec![DAffine3::from_scale_rotation_translation(stretch, turned, center)];
-    let shape = ShapeDesc::Instances { prototype: Reference::new("copied"), transforms };
-    desc.objects.push(ObjectDesc::new(shape, None));
-}
-
 /// A convex object of a kind, about as large as `scale`.
 fn convex(desc: &mut SceneDesc, kind: &str, center: DVec3, scale: f64) {
+    if let Some(kind) = kind.strip_prefix("copied ") {
+        convex(desc, kind, DVec3::ZERO, scale);
+        let object = desc.objects.pop().unwrap();
+        return add_copy(desc, object, center);
+    }
     let half = DVec3::new(0.8, 0.5, 0.6) * scale;
-    let bounds = |center: DVec3| Bounds { min: center - half, max: center + half };
+    let bounds = Bounds { min: center - half, max: center + half };
     let shape = match kind {
         "sphere" => ShapeDesc::Sphere { center, radius: scale },
-        "box" => ShapeDesc::Box(bounds(center)),
+        "box" => ShapeDesc::Box(bounds),
         "cylinder" => ShapeDesc::Cone {
             from: center - half,
             to: center + half,
             radii: [0.5 * scale; 2],
             has_caps: true,
         },
-        "ellipsoid" => {
-            let [xx, yy, zz] = half.to_array().map(|h| (h * h).recip());
-            let k = DVec3::new(xx, yy, zz) * center * -2.0;
-            let constant = -0.5 * k.dot(center) - 1.0;
-            let coefficients = [xx, yy, zz, 0.0, 0.0, 0.0, k.x, k.y, k.z, constant];
-            ShapeDesc::Quadric(Quadric::new(coefficients, bounds(center)))
-        }
-        "copied box" => {
-            let shape = ShapeDesc::Box(bounds(DVec3::ZERO));
-            return add_copy(desc, ObjectDesc::new(shape, Some("grey")), center);
-        }
-        "mesh" => {
+        "ellipsoid" => ellipsoid((half * half).recip(), center, bounds),
+        _ => {
             add_mesh(desc, ball(60, DVec3::ZERO, scale));
             let object = desc.objects.last_mut().unwrap();
             object.transform = DAffine3::from_translation(center);
             return;
-        }
-        _ => {
-            desc.meshes.push(ball(60, DVec3::ZERO, scale));
-            return add_copy(desc, ObjectDesc::new(ShapeDesc::Mesh(0), Some("grey")), center);
         }
     };
     desc.objects.push(ObjectDesc::new(shape, Some("grey")));
@@ -242,13 +219,8 @@ fn hit_again(
         let ray = Ray::new(origin.as_vec3(), (target - origin).normalize().as_vec3());
         let Some(hit) = query.intersect(&ray) else { continue };
         let point = scene.surface(&ray, &hit);
-        // One in four nearly grazing.
         let normal = point.geometric_normal.as_dvec3();
-        let mut d = random.direction();
-        if random.unit() < 0.25 {
-            d -= normal * d.dot(normal) * random.between(0.999, 1.0);
-        }
-        let d = if d.dot(normal) < 0.0 { -d } else { d }.normalize().as_vec3();
+        let d = random.outward(normal).as_vec3();
         if d.dot(point.geometric_normal) <= 0.0 {
             continue;
         }

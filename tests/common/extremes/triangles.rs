@@ -4,10 +4,10 @@ use alhazen::accel::{AccelKind, BruteForce, Geometry, Group, RayBlock, World};
 use alhazen::geometry::TriangleMesh;
 use alhazen::math::Ray;
 use alhazen::measure::bench::agreement;
-use alhazen::scene::{ObjectDesc, Scene, ShapeDesc};
+use alhazen::scene::Scene;
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{Cell, Rung, Table, ball, empty, per_million, power, row, sphere};
+use super::{Cell, Rung, Table, add_mesh, ball, empty, per_million, power, row, sphere};
 use crate::common::Random;
 
 fn world_of(mesh: TriangleMesh) -> World {
@@ -23,7 +23,7 @@ fn with_own_corners(mesh: &TriangleMesh) -> TriangleMesh {
     TriangleMesh::new(xyz, (0..n).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
 }
 
-/// From inside a closed mesh every ray must hit; and from outside, having passed a corner, none again.
+/// From inside a closed mesh every ray must hit.
 pub(super) fn leaks(n: usize) -> Table {
     let places = [
         (0.0, 1.0, true),
@@ -80,10 +80,8 @@ pub(super) fn double_hits(n: usize) -> Table {
             let mesh = ball(60, DVec3::ZERO, scale);
             row(format!("offset {}, scale {}", power(offset), power(scale)), |rung| {
                 let mut desc = empty();
-                desc.meshes.push(mesh.clone());
-                let object = ObjectDesc::new(ShapeDesc::Mesh(0), Some("grey"));
-                let transform = DAffine3::from_translation(center);
-                desc.objects.push(ObjectDesc { transform, ..object });
+                add_mesh(&mut desc, mesh.clone());
+                desc.objects[0].transform = DAffine3::from_translation(center);
                 if offset != 0.0 {
                     // Keeps the world from being recentred on the ball.
                     desc.objects.push(sphere(DVec3::ZERO, 1e-3 * scale));
@@ -186,8 +184,7 @@ pub(super) fn slivers(n: usize) -> Table {
         let corners = (0..TRIANGLES).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let mesh = TriangleMesh::new(xyz, corners);
         let mut desc = empty();
-        desc.meshes.push(mesh.clone());
-        desc.objects.push(ObjectDesc::new(ShapeDesc::Mesh(0), Some("grey")));
+        add_mesh(&mut desc, mesh.clone());
         let scene = Scene::build_quietly(desc, AccelKind::default()).unwrap();
         let brute = BruteForce::new(scene.world());
         // Aimed within their width, so that some hit.
