@@ -185,8 +185,13 @@ fn references_are_kept_by_what_they_depend_on() {
         points(report).iter().map(|p| p["error"].as_f64().unwrap()).collect()
     };
     let arguments = ["--cache", "kept", "--reference-samples", "64", "--samples", "4"];
-    let first = errors(&report(folder, &arguments));
-    assert_eq!(errors(&report(folder, &arguments)), first);
+    let made = report(folder, &arguments);
+    let first = errors(&made);
+    let again = report(folder, &arguments);
+    assert_eq!(errors(&again), first);
+    // It says how it was made, not where it is kept.
+    assert!(made["reference"].as_str().unwrap().starts_with("alhazen render "), "{made}");
+    assert_eq!(again["reference"], made["reference"]);
     let count = || std::fs::read_dir(folder.join("kept")).unwrap().count();
     assert_eq!(count(), 1);
     let other: Vec<&str> = arguments.iter().chain(&["--set", "camera.fov=30"]).copied().collect();
@@ -230,6 +235,18 @@ fn knobs_are_those_that_matter_and_do_what_their_flags_do() {
         "wavelength",
     ] {
         assert!(found.contains(name), "{name}: {found:?}");
+    }
+    // The picture on the floor is blurred for speed, but not in what is taken for the truth.
+    let reference = all["reference"].as_str().unwrap();
+    assert!(reference.contains("render.texture_filter=bilinear"), "{reference}");
+    let adaptive = all["knobs"].as_array().unwrap().iter().find(|knob| knob["name"] == "adaptive");
+    let stated = |i: usize| adaptive.unwrap()["points"][i]["sampling_error"].as_f64().unwrap();
+    let own = all["base"]["sampling_error"].as_f64().unwrap();
+    assert!(stated(0) < 0.75 * own && stated(2) < 0.55 * own && stated(3) < 0.55 * own, "{own}");
+    for kind in ["half", "float"] {
+        let cost = &all["half"][kind];
+        assert!(cost["seconds"].as_f64().unwrap() > 0.0, "{cost}");
+        assert!(cost["bytes"].as_u64().unwrap() > 300, "{cost}");
     }
     assert!(!found.contains("light_samples") && !found.contains("tolerance"), "{found:?}");
     std::fs::write(
@@ -316,7 +333,10 @@ fn pages_and_tables_are_written() {
     assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with("</html>\n"));
     let outside = page.replace("http://www.w3.org/2000/svg", "");
     assert!(!outside.contains("http") && page.contains("data:image/png;base64,"));
+    // Error by seconds, error by samples, memory by seconds (`compact` halves it).
+    assert_eq!(page.matches("<svg ").count(), if cfg!(feature = "embree") { 3 } else { 2 });
     let table = std::fs::read_to_string(folder.join("table.csv")).unwrap();
+    assert!(table.contains("\nrecommended,\"1 s"), "{table}");
     let mut lines = table.lines();
     let columns = lines.next().unwrap().split(',').count();
     for line in lines {

@@ -31,6 +31,9 @@ const WIDTH: u32 = 320;
 /// The header's name of a picture's own relative error.
 const ERROR: &str = "alhazen.error";
 
+/// And of how a reference was made, in words.
+const MADE: &str = "alhazen.made";
+
 /// The fields of `--json`; their names are stable.
 #[derive(Debug, Serialize)]
 struct Report<'a> {
@@ -97,8 +100,9 @@ pub(super) fn trade(args: &TradeArgs) -> Result<Outcome, Failure> {
     let reference = match &args.reference {
         Some(path) => given_reference(path)?,
         None => {
-            let said = format!("{:016x} {width} {height}", loaded.hash);
-            let path = args.cache().map(|folder| cache_file(&folder, &said, &base, samples));
+            let of = reference_choice(&loaded.scene, &base);
+            let said = format!("{:016x} {width} {height} {samples} {of:?}", loaded.hash);
+            let path = args.cache().map(|folder| cache_file(&folder, &said));
             let make = || reference(&loaded.scene, &base, samples, &shown);
             pool.install(|| cached(path.as_deref(), make))?
         }
@@ -211,19 +215,20 @@ fn shrink(desc: &mut SceneDesc, quiet: bool) {
     }
 }
 
-/// A reference that the user brings. Its own error is what its header says, if anything.
+/// A reference that the user brings, or one that is kept. Its own error, and how it was made, are what its
+/// header says, if anything.
 fn given_reference(path: &Path) -> Result<Reference, Failure> {
     let bad = |e: crate::io::ReadError| Failure::BadInput(e.to_string());
     let picture = read_picture(path).map_err(bad)?;
-    let error = read_attributes(path).ok().and_then(|list| error_of(&list)).unwrap_or(0.0);
-    Ok(Reference { film: film(picture), error, made: path.display().to_string() })
-}
-
-fn error_of(attributes: &[Attribute]) -> Option<f64> {
-    attributes.iter().find(|a| a.name == ERROR).and_then(|a| match a.value {
-        AttributeValue::Float(error) => Some(error),
-        _ => None,
-    })
+    let (mut error, mut made) = (0.0, path.display().to_string());
+    for attribute in read_attributes(path).unwrap_or_default() {
+        match (attribute.name.as_str(), attribute.value) {
+            (ERROR, AttributeValue::Float(stated)) => error = stated,
+            (MADE, AttributeValue::Text(words)) => made = words,
+            _ => {}
+        }
+    }
+    Ok(Reference { film: film(picture), error, made })
 }
 
 fn film(picture: Picture) -> Film {
@@ -232,10 +237,12 @@ fn film(picture: Picture) -> Film {
     film
 }
 
-/// The file that a reference is kept in: its name is a hash of all that it depends on.
-fn cache_file(folder: &Path, scene: &str, base: &Choice, samples: u32) -> PathBuf {
-    let said =
-        format!("{} {scene} {samples} {:?}", env!("CARGO_PKG_VERSION"), reference_choice(base));
+/// The file that a reference is kept in: its name is a hash of all that it depends on, this program itself
+/// among it.
+fn cache_file(folder: &Path, scene: &str) -> PathBuf {
+    let program = std::env::current_exe().and_then(std::fs::metadata);
+    let program = program.and_then(|data| Ok((data.len(), data.modified()?))).ok();
+    let said = format!("{} {program:?} {scene}", env!("CARGO_PKG_VERSION"));
     folder.join(format!("reference-{:016x}.exr", xxhash_rust::xxh3::xxh3_64(said.as_bytes())))
 }
 
@@ -251,7 +258,10 @@ fn cached(
     }
     let made = make().map_err(failure)?;
     if let Some(path) = path {
-        let attributes = [Attribute::new(ERROR, AttributeValue::Float(made.error))];
+        let attributes = [
+            Attribute::new(ERROR, AttributeValue::Float(made.error)),
+            Attribute::new(MADE, AttributeValue::Text(made.made.clone())),
+        ];
         let options = ExrOptions { pixel_type: PixelType::Float, ..ExrOptions::default() };
         let folder = path.parent().map_or(Ok(()), std::fs::create_dir_all);
         let written = folder.map_err(|e| e.to_string()).and_then(|()| {
@@ -264,21 +274,23 @@ fn cached(
     Ok(made)
 }
 
-/// A line for each point.
+/// A line for each point, those of samples with the slope, and one for each recommendation, which has
+/// seconds in all.
 fn csv(report: &TradeReport) -> String {
     let mut text = String::from(
         "knob,choice,samples,error,sampling_error,bias,difference,relmse,flip,seconds,ratio,build_seconds,bytes,\
-         efficiency,front,flags\n",
+         efficiency,front,flags,slope,slope_plus_minus\n",
     );
+    let optional = |x: Option<f64>| x.map_or_else(String::new, |x| x.to_string());
+    let words = |text: String| format!("\"{}\"", text.replace('"', "\"\""));
     let own = [("samples", std::slice::from_ref(&report.base)), ("samples", &report.convergence)];
     let knobs = report.knobs.iter().map(|knob| (knob.name, knob.points.as_slice()));
     for (knob, points) in own.into_iter().chain(knobs) {
+        let slope = report.slope.filter(|_| knob == "samples");
         for p in points {
-            let optional = |x: Option<f64>| x.map_or_else(String::new, |x| x.to_string());
-            let words = |text: String| format!("\"{}\"", text.replace('"', "\"\""));
             let _ = writeln!(
                 text,
-                "{knob},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{knob},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 words(p.label.clone()),
                 p.samples,
                 p.error,
@@ -293,9 +305,22 @@ fn csv(report: &TradeReport) -> String {
                 p.bytes,
                 p.efficiency,
                 u8::from(p.is_on_front),
-                words(quoted(&p.flags))
+                words(quoted(&p.flags)),
+                optional(slope.map(|slope| slope.power)),
+                optional(slope.map(|slope| slope.plus_minus)),
             );
         }
+    }
+    for found in &report.recommendations {
+        let reached = if found.is_reached { "" } else { ", not reached" };
+        let _ = writeln!(
+            text,
+            "recommended,{},,{},,,,,,{},,,,,,{},,",
+            words(format!("{}{reached}", aim(found.target))),
+            found.error,
+            found.seconds,
+            words(quoted(&found.flags))
+        );
     }
     text
 }
@@ -303,6 +328,14 @@ fn csv(report: &TradeReport) -> String {
 fn percent(x: f64) -> String {
     let x = 100.0 * x;
     if x == 0.0 || x >= 0.001 { format!("{x:.3} %") } else { format!("{x:.0e} %") }
+}
+
+/// What is aimed at, in words.
+fn aim(target: Target) -> String {
+    match target {
+        Target::Error(error) => format!("an error of {}", percent(error)),
+        Target::Time(seconds) => format!("{seconds} s"),
+    }
 }
 
 fn print_report(scene: &str, report: &TradeReport) {
@@ -315,25 +348,37 @@ fn print_report(scene: &str, report: &TradeReport) {
     ));
     let head = |name: &str| {
         print(&format!(
-            "\n{name:<26}{:>9}{:>11}{:>11}{:>11}{:>11}{:>10}{:>9}{:>8}{:>10}",
-            "samples", "error", "stated", "bias", "differs", "FLIP", "seconds", "x time", "memory"
+            "\n{name:<26}{:>8}{:>11}{:>11}{:>11}{:>11}{:>10}{:>8}{:>9}{:>8}{:>10}{:>11}",
+            "samples",
+            "error",
+            "stated",
+            "bias",
+            "differs",
+            "relMSE",
+            "FLIP",
+            "seconds",
+            "x time",
+            "memory",
+            "efficiency"
         ));
     };
     let line = |p: &Point| {
         let optional = |x: Option<f64>| x.map_or("-".to_owned(), percent);
         let mark = if p.is_on_front { '*' } else { ' ' };
         print(&format!(
-            "{mark} {:<24}{:>9}{:>11}{:>11}{:>11}{:>11}{:>10.4}{:>9.3}{:>8.2}{:>10}",
+            "{mark} {:<24}{:>8}{:>11}{:>11}{:>11}{:>11}{:>10.2e}{:>8.4}{:>9.3}{:>8.2}{:>10}{:>11.2e}",
             p.label,
             p.samples,
             percent(p.error),
             optional(p.sampling_error),
             optional(p.bias),
             optional(p.difference),
+            p.relmse,
             p.flip,
             p.seconds,
             p.ratio,
-            megabytes(p.bytes)
+            megabytes(p.bytes),
+            p.efficiency
         ));
     };
     head("samples");
@@ -350,20 +395,24 @@ fn print_report(scene: &str, report: &TradeReport) {
     }
     let half = report.half;
     print(&format!(
-        "\nhalf instead of float adds an error of {}; {} pixels are beyond half",
+        "\nhalf instead of float adds an error of {}; {} pixels are beyond half{}",
         percent(half.error),
-        half.beyond
+        half.beyond,
+        half.half.zip(half.float).map_or_else(String::new, |(half, float)| format!(
+            "; {:.4} s and {} to write, of float {:.4} s and {}",
+            half.seconds,
+            megabytes(half.bytes),
+            float.seconds,
+            megabytes(float.bytes)
+        ))
     ));
     print("* nothing measured is both faster and better");
     for found in &report.recommendations {
-        let what = match found.target {
-            Target::Error(error) => format!("for an error of {}", percent(error)),
-            Target::Time(seconds) => format!("for {seconds} s"),
-        };
+        let what = aim(found.target);
         let not = if found.is_reached { "" } else { "NOT REACHED: " };
         let (error, flags) = (percent(found.error), quoted(&found.flags));
         print(&format!(
-            "\n{what}: {not}{error} in {:.2} s with\n  alhazen render {scene} {flags}",
+            "\nfor {what}: {not}{error} in {:.2} s with\n  alhazen render {scene} {flags}",
             found.seconds
         ));
     }

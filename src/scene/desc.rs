@@ -87,6 +87,13 @@ pub struct SceneDesc {
     pub volumes: Vec<VolumeDesc>,
 }
 
+impl SceneDesc {
+    /// How each texture that is a picture is filtered, if `texture_filter` does not say otherwise.
+    pub fn texture_filters(&self) -> impl Iterator<Item = TexelFilter> {
+        self.materials.iter().flat_map(|material| material.maps.texture_filters())
+    }
+}
+
 /// The picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageDesc {

@@ -5,25 +5,32 @@
 //! measured here, and beside it what its own estimate cannot know, the bias. Seconds are those of the
 //! render of the scene as it stands, times the median ratio to it in interleaved rounds.
 
+mod chart;
 mod choice;
+mod convergence;
+mod files;
 mod page;
 mod recommend;
 
 use std::time::Instant;
 
-use exr::prelude::f16;
 use serde::Serialize;
 
 pub use choice::{Choice, Effect, Knob, knobs};
+pub use convergence::Slope;
+pub use files::{FileCost, HalfLoss};
 pub use page::{html, quoted};
 pub use recommend::{Recommendation, Target};
 
+use convergence::{numbers_of_samples, slope};
+use files::half_loss;
+
 use super::{CompareOptions, compare};
 use crate::accel::Precision;
-use crate::color::Rgb;
 use crate::film::{Film, Picture};
 use crate::render::{Observer, RenderJob, Stop, StopRules, render};
 use crate::scene::{Epsilon, IntegratorKind, Scene, SceneDesc, SceneError};
+use crate::texture::TexelFilter;
 
 /// Seed of the reference: not that of what is compared with it.
 const REFERENCE_SEED: u64 = 0x1021_0000;
@@ -79,19 +86,10 @@ pub struct TradeReport {
     pub slope: Option<Slope>,
     /// Each knob that matters, and what became of its choices.
     pub knobs: Vec<KnobReport>,
-    /// What half-float files lose.
+    /// What half-float files lose and save.
     pub half: HalfLoss,
     /// Settings that reach what was asked for.
     pub recommendations: Vec<Recommendation>,
-}
-
-/// The power of a fit.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct Slope {
-    /// Of the squared error by the number of samples: −1 for independent samples.
-    pub power: f64,
-    /// Half the width of its 95 % interval.
-    pub plus_minus: f64,
 }
 
 /// A knob and its choices.
@@ -103,15 +101,6 @@ pub struct KnobReport {
     pub effect: &'static str,
     /// A point for each choice, beside the base's.
     pub points: Vec<Point>,
-}
-
-/// What halves lose of a picture, beside what samples do.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct HalfLoss {
-    /// Relative error by rounding to half alone.
-    pub error: f64,
-    /// Pixels that half cannot hold: the file is then written as float.
-    pub beyond: u64,
 }
 
 /// A way to render, measured.
@@ -215,8 +204,11 @@ struct Measured {
     seconds: f64,
 }
 
-/// The settings of a reference: nothing cut short that costs accuracy.
-pub fn reference_choice(base: &Choice) -> Choice {
+/// How much finer than what a scene says the steps through its volumes are, of a reference.
+const FINER_VOLUMES: f64 = 0.1;
+
+/// The settings of a reference of `desc`, which `base` renders: nothing cut short that costs accuracy.
+pub fn reference_choice(desc: &SceneDesc, base: &Choice) -> Choice {
     let mut choice = base.clone();
     let settings = &mut choice.settings;
     settings.max_depth = settings.max_depth.max(32);
@@ -227,6 +219,12 @@ pub fn reference_choice(base: &Choice) -> Choice {
     settings.precision = settings.precision.max(Precision::Robust);
     settings.epsilon = Epsilon::Auto;
     settings.tolerance = settings.tolerance.times(0.25);
+    let filters: Vec<TexelFilter> =
+        desc.texture_filters().map(|own| settings.texture_filter.unwrap_or(own)).collect();
+    // Texels that are to be seen as such stay.
+    if filters.contains(&TexelFilter::Mip) && !filters.contains(&TexelFilter::Nearest) {
+        settings.texture_filter = Some(TexelFilter::Bilinear);
+    }
     (choice.error, choice.is_adaptive) = (None, false);
     choice
 }
@@ -242,9 +240,11 @@ pub fn reference(
     observer: &dyn TradeObserver,
 ) -> Result<Reference, TradeError> {
     observer.now("reference");
-    let mut choice = reference_choice(base);
+    let mut choice = reference_choice(desc, base);
     choice.settings.samples = samples;
-    let scene = build(desc, &choice)?.scene;
+    let mut finer = desc.clone();
+    finer.volumes.iter_mut().for_each(|volume| volume.tolerance *= FINER_VOLUMES);
+    let scene = build(&finer, &choice)?.scene;
     let rendered =
         render(&scene, &RenderJob { seed: REFERENCE_SEED, ..RenderJob::default() }, observer);
     if rendered.stop == Stop::Interrupted {
@@ -252,7 +252,10 @@ pub fn reference(
     }
     let error = rendered.film.relative_error().unwrap_or(0.0);
     let flags = choice.flags(base).join(" ");
-    Ok(Reference { film: rendered.film, error, made: format!("alhazen render {flags}") })
+    let volumes =
+        if desc.volumes.is_empty() { "" } else { ", and a tenth of the volumes' tolerance" };
+    let made = format!("alhazen render {flags}{volumes}");
+    Ok(Reference { film: rendered.film, error, made })
 }
 
 fn build(desc: &SceneDesc, choice: &Choice) -> Result<Built, TradeError> {
@@ -319,7 +322,7 @@ pub fn trade(
         };
         reports.push(KnobReport { name: knob.name, effect, points });
     }
-    let half = half_loss(&base_point.looks.0);
+    let half = half_loss(&base_point.looks.0, &own.film, options.rounds);
     let mut report = TradeReport {
         size: built.scene.size,
         threads: rayon::current_num_threads(),
@@ -433,66 +436,27 @@ impl Trade<'_> {
     }
 }
 
-/// Numbers of samples beside the scene's own: powers of four, as far as the reference tells them apart.
-fn numbers_of_samples(own: u32, reference: u32) -> Vec<u32> {
-    let powers = (0..12).map(|power| 1u32 << (2 * power));
-    powers
-        .take_while(|n| *n <= (reference / 4).max(own).min(64 * own))
-        .filter(|n| *n != own)
-        .collect()
-}
-
-/// Until half the error of the scene as it stands: the same number everywhere, or where the error is.
+/// Until less than the error of the scene as it stands: with the same number everywhere, and then with more
+/// where the error is.
 fn adaptive(base: &Choice, point: &Point) -> Option<Knob> {
     let error = point.sampling_error.filter(|error| *error > 0.0)?;
-    // Three digits.
-    let power = 10f64.powf(2.0 - (0.5 * error).log10().floor());
-    let error = (0.5 * error * power).round() / power;
-    let choices = [false, true].map(|is_adaptive| {
-        let label = if is_adaptive { "adaptive" } else { "uniform" };
-        let choice = Choice { error: Some(error), is_adaptive, ..base.clone() };
-        (format!("to {:.3} %, {label}", 100.0 * error), choice)
-    });
-    Some(Knob { name: "adaptive", effect: Effect::Noise, choices: choices.into() })
-}
-
-/// What rounding to half does to a picture.
-fn half_loss(picture: &Picture) -> HalfLoss {
-    let film = |pixels: Vec<Rgb>| {
-        let mut film = Film::new(picture.size, crate::film::PixelRect::whole(picture.size), false);
-        film.mean = pixels;
-        film
+    let until = |share: f64| {
+        let error = three_digits(share * error);
+        [false, true].map(|is_adaptive| {
+            let label = if is_adaptive { "adaptive" } else { "uniform" };
+            let choice = Choice { error: Some(error), is_adaptive, ..base.clone() };
+            (format!("to {:.3} %, {label}", 100.0 * error), choice)
+        })
     };
-    let round = |x: f32| f16::from_f32(x).to_f32();
-    let rounded: Vec<Rgb> = picture.pixels.iter().map(|c| c.map(round)).collect();
-    let beyond = rounded.iter().filter(|c| !c.is_finite()).count() as u64;
-    let error = film(rounded).error_against(&film(picture.pixels.clone()));
-    HalfLoss { error, beyond }
+    // What twice and four times the samples are for.
+    let choices = [std::f64::consts::FRAC_1_SQRT_2, 0.5].into_iter().flat_map(until).collect();
+    Some(Knob { name: "adaptive", effect: Effect::Noise, choices })
 }
 
-/// A line through the logarithms of squared error and number of samples; none with fewer than three points.
-fn slope<'a>(points: impl Iterator<Item = &'a Point>) -> Option<Slope> {
-    // Without what a bias holds back.
-    let known = points.filter(|p| p.error > 0.0 && p.bias.is_none());
-    let points: Vec<[f64; 2]> =
-        known.map(|p| [f64::from(p.samples).ln(), 2.0 * p.error.ln()]).collect();
-    let n = points.len() as f64;
-    if points.len() < 3 {
-        return None;
-    }
-    let mean = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n);
-    let sum = |a: usize, b: usize| {
-        points.iter().map(|p| (p[a] - mean[a]) * (p[b] - mean[b])).sum::<f64>()
-    };
-    let power = sum(0, 1) / sum(0, 0);
-    let residual = (sum(1, 1) - power * sum(0, 1)).max(0.0) / (n - 2.0);
-    Some(Slope { power, plus_minus: student(points.len() - 2) * (residual / sum(0, 0)).sqrt() })
-}
-
-/// Student's t for a two-sided 95 % interval.
-fn student(degrees: usize) -> f64 {
-    const TABLE: [f64; 10] = [12.71, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
-    TABLE.get(degrees.wrapping_sub(1)).copied().unwrap_or(2.0)
+/// Rounded down, for a flag.
+fn three_digits(x: f64) -> f64 {
+    let power = 10f64.powf(2.0 - x.log10().floor());
+    (x * power).floor() / power
 }
 
 fn median(values: &[f64]) -> f64 {

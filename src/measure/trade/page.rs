@@ -1,11 +1,12 @@
-//! The report as a page: settings, a chart of error by seconds, a table and pictures for each knob.
+//! The report as a page: settings, charts, a table and pictures for each knob.
 
 use std::fmt::Write;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use super::{KnobReport, Point, Recommendation, Target, TradeReport};
+use super::chart::{error_by_samples, error_by_seconds, memory_by_seconds};
+use super::{HalfLoss, KnobReport, Point, Recommendation, Target, TradeReport};
 use crate::color::Rgb;
 use crate::film::Picture;
 use crate::measure::html::{escaped, page};
@@ -13,12 +14,6 @@ use crate::measure::magma;
 
 /// Most pixels across of the pictures in the page.
 const THUMBNAIL: u32 = 320;
-
-/// Colours of knobs in the chart.
-const COLOURS: [&str; 10] = [
-    "#2f6cad", "#c4572e", "#3d8a4e", "#8b5fb0", "#a08b1d", "#c2447f", "#2b9b9b", "#7a5a3a",
-    "#5a6b7b", "#d08a2c",
-];
 
 /// How pictures become PNG.
 type Png<'a> = &'a dyn Fn(&Picture) -> Vec<u8>;
@@ -43,7 +38,7 @@ pub fn html(scene: &str, report: &TradeReport, reference: &Picture, png: Png<'_>
     }
     body += "<h2>Error by seconds</h2>\n<p>The line joins the scene's own settings at several numbers of \
              samples; what nothing measured beats in both is ringed and named.</p>\n";
-    body += &chart(report);
+    body += &error_by_seconds(report);
     body += "<div class=\"strip\">";
     body += &figure("reference", reference, png);
     body += &figure("as it stands", &report.base.looks.0, png);
@@ -57,20 +52,47 @@ pub fn html(scene: &str, report: &TradeReport, reference: &Picture, png: Png<'_>
             slope.power, slope.plus_minus
         );
     }
+    body += "<p>Black is what was measured, blue what the renders state of themselves, grey how independent \
+             samples would go on from the first; coloured points are knobs that trade noise, named where they \
+             took another number of samples.</p>\n";
+    body += &error_by_samples(report);
     let mut samples: Vec<&Point> = report.convergence.iter().chain([&report.base]).collect();
     samples.sort_by_key(|point| point.samples);
     body += &table("samples", samples.into_iter(), None);
+    let memory = memory_by_seconds(report);
+    if !memory.is_empty() {
+        let _ = writeln!(
+            body,
+            "<h2>Memory by seconds</h2>\n<p>The accelerator's, of what changes it.</p>\n{memory}"
+        );
+    }
     for knob in &report.knobs {
         body += &section(report, knob, png);
     }
-    let _ = writeln!(
-        body,
-        "<h2>Half or float</h2>\n<p>Rounding to half adds a relative error of {}; {} pixels are beyond what half \
-         holds.</p>",
-        percent(report.half.error),
-        report.half.beyond
-    );
+    body += &half_or_float(&report.half);
     page(&format!("alhazen trade: {scene}"), &body)
+}
+
+fn half_or_float(half: &HalfLoss) -> String {
+    let mut text = format!(
+        "<h2>Half or float</h2>\n<p>Rounding to half adds a relative error of {}; {} pixels are beyond what half \
+         holds.</p>\n",
+        percent(half.error),
+        half.beyond
+    );
+    if let (Some(a), Some(b)) = (half.half, half.float) {
+        text += "<table><tr><th>file</th><th>seconds to write</th><th>size</th></tr>\n";
+        for (name, cost) in [("half", a), ("float", b)] {
+            let megabytes = cost.bytes as f64 / 1e6;
+            let _ = writeln!(
+                text,
+                "<tr><td>{name}</td><td>{:.4}</td><td>{megabytes:.2} MB</td></tr>",
+                cost.seconds
+            );
+        }
+        text += "</table>\n";
+    }
+    text
 }
 
 fn recommended(scene: &str, found: &Recommendation) -> String {
@@ -196,7 +218,7 @@ fn shrunk(picture: &Picture) -> Picture {
     Picture::whole(extent, places.map(|(x, y)| pixel(x, y)).collect())
 }
 
-fn percent(x: f64) -> String {
+pub(super) fn percent(x: f64) -> String {
     match 100.0 * x {
         0.0 => "0 %".to_owned(),
         x if x >= 10.0 => format!("{x:.1} %"),
@@ -205,128 +227,9 @@ fn percent(x: f64) -> String {
     }
 }
 
-/// Points of the chart: label, colour, and the point.
-fn chart_points(report: &TradeReport) -> Vec<(String, &'static str, &Point)> {
-    let own = std::iter::once(&report.base).chain(&report.convergence);
-    let own = own.map(|point| (format!("{} samples", point.samples), "#1b1f24", point));
-    let shown = report.knobs.iter().filter(|knob| knob.effect != "look");
-    let turned = shown.zip(COLOURS.iter().cycle()).flat_map(|(knob, colour)| {
-        let points = knob.points.iter();
-        points.map(move |point| (format!("{} {}", knob.name, point.label), *colour, point))
-    });
-    own.chain(turned).filter(|(_, _, p)| p.error > 0.0 && p.seconds > 0.0).collect()
-}
-
-/// Error over seconds, both in decades.
-fn chart(report: &TradeReport) -> String {
-    const SIZE: [f64; 2] = [900.0, 460.0];
-    const MARGIN: [f64; 4] = [64.0, 150.0, 12.0, 40.0];
-    let points = chart_points(report);
-    let range = |value: &dyn Fn(&Point) -> f64| {
-        let logs = points.iter().map(|(_, _, p)| value(p).log10());
-        let (low, high) = logs.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-        let pad = 0.05 * (high - low).max(0.5);
-        (low - pad, high + pad)
-    };
-    if points.is_empty() {
-        return String::new();
-    }
-    let (x0, x1) = range(&|p| p.seconds);
-    let (y0, y1) = range(&|p| 100.0 * p.error);
-    let x = |seconds: f64| {
-        MARGIN[0] + (seconds.log10() - x0) / (x1 - x0) * (SIZE[0] - MARGIN[0] - MARGIN[1])
-    };
-    let y = |percent: f64| {
-        MARGIN[2] + (y1 - percent.log10()) / (y1 - y0) * (SIZE[1] - MARGIN[2] - MARGIN[3])
-    };
-    let (left, right) = (MARGIN[0], SIZE[0] - MARGIN[1]);
-    let (top, bottom) = (MARGIN[2], SIZE[1] - MARGIN[3]);
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" role=\"img\">\n",
-        SIZE[0], SIZE[1]
-    );
-    for value in ticks(x0, x1) {
-        let at = x(value);
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{at:.1}\" y1=\"{top}\" x2=\"{at:.1}\" y2=\"{bottom}\" stroke=\"#e3e6e9\"/>\
-             <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\" class=\"faint\">{value} s</text>",
-            bottom + 16.0
-        );
-    }
-    for value in ticks(y0, y1) {
-        let at = y(value);
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{left}\" y1=\"{at:.1}\" x2=\"{right}\" y2=\"{at:.1}\" stroke=\"#e3e6e9\"/>\
-             <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\" class=\"faint\">{value} %</text>",
-            left - 6.0,
-            at + 4.0
-        );
-    }
-    let mut own: Vec<&Point> =
-        points.iter().filter(|(_, colour, _)| *colour == "#1b1f24").map(|(_, _, p)| *p).collect();
-    own.sort_by_key(|p| p.samples);
-    let line: Vec<String> =
-        own.iter().map(|p| format!("{:.1},{:.1}", x(p.seconds), y(100.0 * p.error))).collect();
-    let _ = writeln!(
-        svg,
-        "<polyline points=\"{}\" fill=\"none\" stroke=\"#1b1f24\" stroke-width=\"1.5\"/>",
-        line.join(" ")
-    );
-    // Names keep off each other.
-    let mut lowest = f64::NEG_INFINITY;
-    let mut named: Vec<_> = points.iter().filter(|(_, _, p)| p.is_on_front).collect();
-    named.sort_by(|a, b| b.2.error.total_cmp(&a.2.error));
-    let mut names = Vec::new();
-    for (name, colour, point) in named {
-        let at = (y(100.0 * point.error) + 4.0).max(lowest + 13.0);
-        lowest = at;
-        names.push((name, colour, x(point.seconds), at));
-    }
-    for (name, colour, point) in &points {
-        let (cx, cy) = (x(point.seconds), y(100.0 * point.error));
-        let ring = if point.is_on_front { " stroke=\"#1b1f24\" stroke-width=\"2\"" } else { "" };
-        let _ = writeln!(
-            svg,
-            "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"4.5\" fill=\"{colour}\"{ring}><title>{}: {} in {:.3} \
-             s</title></circle>",
-            escaped(name),
-            percent(point.error),
-            point.seconds
-        );
-    }
-    for (name, colour, at_x, at_y) in names {
-        let _ = writeln!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{at_y:.1}\" class=\"name\" style=\"fill:{colour}\">{}</text>",
-            at_x + 9.0,
-            escaped(name)
-        );
-    }
-    svg += "</svg>\n";
-    svg
-}
-
-/// 1, 2 and 5 of each decade between two powers of ten; of many decades the powers alone.
-fn ticks(low: f64, high: f64) -> Vec<f64> {
-    let steps: &[f64] = if high - low > 2.5 { &[1.0] } else { &[1.0, 2.0, 5.0] };
-    let decades = low.floor() as i32..=high.ceil() as i32;
-    let all = decades.flat_map(|d| steps.iter().map(move |s| (s, d)));
-    // Written out, so that they read as they are.
-    let values = all.filter_map(|(s, d)| format!("{s}e{d}").parse::<f64>().ok());
-    values.filter(|v| (low..=high).contains(&v.log10())).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn ticks_are_round() {
-        assert_eq!(ticks(-1.1, 0.35), [0.1, 0.2, 0.5, 1.0, 2.0]);
-        assert_eq!(ticks(-2.0, 1.0), [0.01, 0.1, 1.0, 10.0]);
-    }
 
     #[test]
     fn pictures_shrink_by_means() {

@@ -5,7 +5,10 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::{Choice, Measured, Point, Trade, TradeError, TradeReport, build, reference_choice};
+use super::{
+    Choice, Measured, Point, Trade, TradeError, TradeReport, build, reference_choice, three_digits,
+};
+use crate::scene::SceneDesc;
 
 /// What settings are to reach.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -103,6 +106,9 @@ const AIM: f64 = 0.93;
 /// What is aimed at, of a time.
 const AIM_OF_TIME: f64 = 0.9;
 
+/// What gains less than measurements scatter is not worth a flag.
+const GAIN: f64 = 0.94;
+
 /// Finds settings for a target, and tries them.
 pub(super) fn recommend(
     trade: &Trade<'_>,
@@ -126,7 +132,7 @@ pub(super) fn recommend(
         combine(&mut choice, turn);
     }
     // What to fall back on where a bias shows that no knob by itself had.
-    let mut safer = vec![safest(report)];
+    let mut safer = vec![safest(trade.desc, report)];
     if !chosen.is_empty() {
         safer.push(base.choice.clone());
     }
@@ -264,9 +270,9 @@ fn with_given(given: &[Vec<String>], flags: Vec<String>) -> Vec<String> {
 }
 
 /// The scene as it stands with what its reference has of the knobs that matter to it.
-fn safest(report: &TradeReport) -> Choice {
+fn safest(desc: &SceneDesc, report: &TradeReport) -> Choice {
     let mut choice = report.base.choice.clone();
-    let from = reference_choice(&choice).settings;
+    let from = reference_choice(desc, &choice).settings;
     let matters = |name: &str| report.knobs.iter().any(|knob| knob.name == name);
     let to = &mut choice.settings;
     if matters("max_depth") {
@@ -276,6 +282,7 @@ fn safest(report: &TradeReport) -> Choice {
     if matters("tolerance") {
         to.tolerance = from.tolerance;
     }
+    to.texture_filter = from.texture_filter;
     (to.precision, to.epsilon) = (from.precision, from.epsilon);
     choice
 }
@@ -286,17 +293,14 @@ fn most_measured(report: &TradeReport) -> f64 {
     f64::from(points.map(|point| point.samples).max().unwrap_or(1))
 }
 
-/// Whether the same error was reached in less time with samples where the error is.
+/// Whether the same errors were reached in less time with samples where the error is.
 fn is_adaptive_cheaper(report: &TradeReport) -> bool {
     let knob = report.knobs.iter().find(|knob| knob.name == "adaptive");
-    let [uniform, adaptive] = knob.map_or(&[][..], |knob| &knob.points) else { return false };
-    adaptive.bias.is_none() && adaptive.seconds < 0.9 * uniform.seconds
-}
-
-/// Rounded down, for a flag.
-fn three_digits(x: f64) -> f64 {
-    let power = 10f64.powf(2.0 - x.log10().floor());
-    (x * power).floor() / power
+    let (pairs, _) = knob.map_or(&[][..], |knob| &knob.points).as_chunks::<2>();
+    let is_cheaper = |[uniform, adaptive]: &[Point; 2]| {
+        adaptive.bias.is_none() && adaptive.seconds < 0.9 * uniform.seconds
+    };
+    !pairs.is_empty() && pairs.iter().all(is_cheaper)
 }
 
 /// What each choice does, where it may be recommended.
@@ -350,9 +354,8 @@ fn choose<'t, 'a>(model: &Model, all: &'t [Turn<'a>], target: Target) -> Vec<&'t
             (cost(&turns), turn)
         };
         let best = free.map(with).min_by(|a, b| a.0.total_cmp(&b.0));
-        // What gains less than measurements scatter is not worth a flag.
         match best {
-            Some((cost, turn)) if cost < 0.97 * now || (now.is_infinite() && cost.is_finite()) => {
+            Some((cost, turn)) if cost < GAIN * now || (now.is_infinite() && cost.is_finite()) => {
                 chosen.push(turn);
             }
             _ => return chosen,
