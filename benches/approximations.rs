@@ -170,6 +170,17 @@ fn rows() -> Vec<Row> {
             .or("1e-6", &["render.epsilon=1e-6"])
             .or("1e-4", &["render.epsilon=1e-4"])
             .or("1e-2", &["render.epsilon=1e-2"]),
+        Row::new("`filter`, of pixels", "`\"blackman-harris\"`", Bias, specular)
+            .choices(("`\"blackman-harris\"`", &["render.filter=blackman-harris"]))
+            .or("`\"box\"`", &["render.filter=box"])
+            .or("`\"triangle\"`", &["render.filter=triangle"])
+            .or("`\"gaussian\"`", &["render.filter=gaussian"])
+            .or("`\"mitchell\"`", &["render.filter=mitchell"]),
+        Row::new("`ao_distance`, in a scene 9 m wide", "without end", Bias, &[POINT])
+            .based(["render.integrator=ao".to_owned()])
+            .choices(("without end", &[]))
+            .or("3 m", &["render.ao_distance=3.0"])
+            .or("0.5 m", &["render.ao_distance=0.5"]),
         Row::new("`fresnel`, of glass", "`\"exact\"`", Bias, &[POINT])
             .choices(("`\"exact\"`", &[]))
             .or("`\"schlick\"`", &[])

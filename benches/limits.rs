@@ -1,24 +1,28 @@
 //! How near a large mesh comes to what Embree could do at best: ratios within one run, with their targets.
 //!
-//! `cargo bench --bench limits [-- TRIANGLES]...` (1 and 10 million) generates a terrain for each size and
-//! prints, as medians over interleaved rounds,
+//! `cargo bench --bench limits [-- TRIANGLES|MESH]...` (1 and 10 million) generates a terrain for each size
+//! and prints, as medians over interleaved rounds,
 //! - of a render of one sample a pixel under a sun, and one of ambient occlusion: which share of its time
 //!   the bare queries of its own rays take, written down and asked again by calls of Embree alone, without
 //!   shading;
 //! - what packets gain over single rays;
 //! - of a run of the program from its start to a picture of 64 x 36 pixels: reading by building, and all
-//!   of it by a bare build of the same arrays.
+//!   of it by a bare build of the same arrays;
+//! - of whole renders, `exact` by `robust`. This is all that it says of the file of a MESH, and of the house
+//!   of 1.5 million triangles where the assets are there.
 #![allow(clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
 
 mod common;
+#[path = "../tests/common/mod.rs"]
+mod fixtures;
 
 use std::hint::black_box;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
 
-use alhazen::accel::{Accel, EmbreeAccel, Geometry, RayBlock};
+use alhazen::accel::{Accel, AccelKind, EmbreeAccel, Geometry, Precision, RayBlock};
 use alhazen::camera::Projection;
 use alhazen::color::Rgb;
 use alhazen::embree::{
@@ -44,8 +48,15 @@ fn main() {
     if let Ok(path) = std::env::var(BARE_BUILD) {
         return println!("{}", build_bare(Path::new(&path)));
     }
-    let sizes: Vec<u64> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
-    let sizes = if sizes.is_empty() { vec![1_000_000, 10_000_000] } else { sizes };
+    let given: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let mut sizes: Vec<u64> = given.iter().filter_map(|a| a.parse().ok()).collect();
+    let meshes = given.iter().filter(|a| a.parse::<u64>().is_err());
+    let mut meshes: Vec<PathBuf> = meshes.map(PathBuf::from).collect();
+    if given.is_empty() {
+        sizes = vec![1_000_000, 10_000_000];
+        let house = |root: PathBuf| root.join("mesh/ply/victorian_house_1.5M.ply");
+        meshes.extend(fixtures::assets().map(house).filter(|path| path.exists()));
+    }
     let folder = tempfile::tempdir().expect("a temporary folder");
     for triangles in sizes {
         let path = folder.path().join(format!("terrain{triangles}.ply"));
@@ -58,12 +69,56 @@ fn main() {
         );
         rays(&path);
         from_file(&path);
+        ladder(|precision| {
+            let mut desc = desc(&path, IntegratorKind::Direct);
+            desc.settings.precision = precision;
+            desc
+        });
         std::fs::remove_file(&path).expect("it is there");
+    }
+    for path in meshes {
+        println!("{}", path.display());
+        ladder(|precision| {
+            let mut desc = load_scene(&path, &LoadOptions::default()).expect("a mesh").scene;
+            desc.settings.precision = precision;
+            desc
+        });
+    }
+}
+
+/// What `exact` takes by `robust`, of a scene with shadows and of the open sky's light: builds, and renders
+/// of 1280 x 720 pixels with 4 samples.
+fn ladder(desc: impl Fn(Precision) -> SceneDesc) {
+    for (name, integrator) in
+        [("direct light", IntegratorKind::Direct), ("ambient occlusion", IntegratorKind::Ao)]
+    {
+        let build = |precision| {
+            let mut desc = desc(precision);
+            desc.settings.integrator = integrator;
+            desc.image.size = [1280, 720];
+            desc.settings.samples = 4;
+            let start = Instant::now();
+            let scene = Scene::build_quietly(desc, AccelKind::default()).expect("a sound scene");
+            (scene, start.elapsed().as_secs_f64())
+        };
+        let (robust, robust_build) = build(Precision::Robust);
+        let (exact, exact_build) = build(Precision::Exact);
+        let run = |scene: &Scene| drop(black_box(render(scene, &RenderJob::default(), &())));
+        let rounds = interleaved(&|| run(&exact), &|| run(&robust), ROUNDS);
+        let (time, [low, high]) = ratio(&rounds);
+        println!(
+            "  exact by robust, {name}: {time:.2} ({low:.2} to {high:.2}), its build {:.2}; target 1.3",
+            exact_build / robust_build
+        );
     }
 }
 
 /// The terrain of a file, seen from a corner under a low sun.
 fn scene(path: &Path, integrator: IntegratorKind) -> Scene {
+    Scene::build_quietly(desc(path, integrator), AccelKind::default()).expect("a sound scene")
+}
+
+fn desc(path: &Path, integrator: IntegratorKind) -> SceneDesc {
     let mut desc: SceneDesc = load_scene(path, &LoadOptions::default()).expect("ours").scene;
     desc.image.size = [1920, 1080];
     desc.settings.samples = 1;
@@ -81,7 +136,7 @@ fn scene(path: &Path, integrator: IntegratorKind) -> Scene {
     });
     let (direction, irradiance) = (DVec3::new(0.75, -0.45, 0.42), Rgb::splat(3.0));
     desc.lights = vec![LightDesc::Directional { direction, irradiance }];
-    Scene::build_quietly(desc, alhazen::accel::AccelKind::default()).expect("a sound scene")
+    desc
 }
 
 fn rays(path: &Path) {

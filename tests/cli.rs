@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use alhazen::io::{AttributeValue, read_attributes};
+
 mod common;
 use common::{alhazen, stderr, stdout};
 
@@ -395,4 +397,62 @@ fn an_interrupt_leaves_a_valid_picture() {
     assert_eq!(read_exr(&folder.path().join("cut.exr")).1, [80, 60]);
     let stats = std::fs::read_to_string(folder.path().join("s.json")).unwrap();
     assert!(stats.contains("\"stop\": \"interrupted\""), "{stats}");
+}
+
+/// The header names what shifts the picture, as far as the scene has what it acts on, and nothing else.
+#[test]
+fn the_header_names_what_shifts_the_picture() {
+    let folder = folder();
+    let bias = |scene: &str, arguments: &[&str]| -> String {
+        std::fs::write(folder.path().join("bias.toml"), scene).unwrap();
+        let quick =
+            ["render", "bias.toml", "-q", "-o", "bias.exr", "--samples", "1", "--size", "8x6"];
+        run(folder.path(), &quick.iter().chain(arguments).copied().collect::<Vec<_>>());
+        let attributes = read_attributes(&folder.path().join("bias.exr")).unwrap();
+        let found = attributes.into_iter().find(|a| a.name == "alhazen.bias").unwrap();
+        let AttributeValue::Text(text) = found.value else { panic!("no text") };
+        text
+    };
+    let plain = "[[objects]]\nshape = \"sphere\"\nradius = 1\n";
+    assert_eq!(bias(plain, &[]), "precision=robust");
+    let ao = ["--integrator", "ao", "--set", "render.ao_distance=0.5"];
+    assert_eq!(bias(plain, &ao), "precision=robust ao_distance=0.5");
+
+    run(folder.path(), &["render", "bias.toml", "-q", "-o", "texels.png", "--samples", "1"]);
+    let all = "[medium]\ntype = \"fog\"\nscattering = 0.05\ndims_lights = false\n\
+        [materials.glass]\ntype = \"dielectric\"\nior = { abbe = [1.5, 30] }\nfresnel = \"schlick\"\n\
+        [materials.gold]\ntype = \"conductor\"\nmetal = \"gold\"\n\
+        fresnel = { offset = 0.4, scale = 0.6, power = 5 }\n\
+        [materials.paper]\ntype = \"diffuse\"\n\
+        reflectance = { image = \"texels.png\", mapping = \"planar\" }\n\
+        [[lights]]\ntype = \"point\"\nposition = [0, 9, 0]\nintensity = 9\n\
+        [[objects]]\nshape = \"sphere\"\nradius = 1\nmaterial = \"glass\"\n\
+        [[objects]]\nshape = \"sphere\"\nradius = 1\ncenter = [2, 0, 0]\nmaterial = \"gold\"\n\
+        [[objects]]\nshape = \"disk\"\nradius = 9\ncenter = [0, -1, 0]\nnormal = [0, 1, 0]\nmaterial = \"paper\"\n";
+    assert_eq!(
+        bias(all, &["--set", "render.wavelength=550", "--set", "render.prune=0.1"]),
+        "precision=robust max_depth=8 prune=0.1 shadows=opaque fresnel=power,schlick \
+         texture_filter=mip wavelength=550 dims_lights=false"
+    );
+    let bilinear = ["--set", "render.texture_filter=bilinear", "--integrator", "direct"];
+    let found = bias(all, &bilinear);
+    assert!(!found.contains("texture_filter") && !found.contains("max_depth"), "{found}");
+
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let smoke = format!(
+        "[[volumes]]\ngrid = \"{}\"\nbounds = [[-1, -1, -1], [1, 1, 1]]\ntolerance = 0.02\n\
+         transfer = [{{ value = 0, color = 0, extinction = 0 }}, {{ value = 1, color = 1, extinction = 8 }}]\n",
+        scenes.join("grids/smoke.npy").display()
+    );
+    assert_eq!(bias(&smoke, &[]), "precision=robust volume_tolerance=0.02");
+    let teapot = scenes.join("teapot.toml");
+    let teapot = teapot.to_str().unwrap();
+    run(
+        folder.path(),
+        &["render", teapot, "-q", "-o", "bias.exr", "--samples", "1", "--size", "8x6"],
+    );
+    let attributes = read_attributes(&folder.path().join("bias.exr")).unwrap();
+    let found = attributes.iter().find(|a| a.name == "alhazen.bias").unwrap();
+    let AttributeValue::Text(text) = &found.value else { panic!("no text") };
+    assert!(text.contains("tolerance=0.5px"), "{text}");
 }

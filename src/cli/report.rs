@@ -1,5 +1,6 @@
 //! What a render says at the end: a table for people, JSON for programs, attributes for the EXR.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::Serialize;
@@ -9,8 +10,10 @@ use super::{Failure, print, render::Phases};
 use crate::accel::AccelInfo;
 use crate::film::{Aov, Film, SamplingError};
 use crate::io::{Attribute, AttributeValue, matte_attributes};
+use crate::material::FresnelModel;
 use crate::render::{Rendered, Stop};
 use crate::scene::{Epsilon, IntegratorKind, Scene};
+use crate::texture::TexelFilter;
 
 /// The fields of `--stats`; their names are stable.
 #[derive(Debug, Serialize)]
@@ -266,6 +269,27 @@ fn biasing_options(scene: &Scene, is_adaptive: bool) -> String {
     if r.dielectrics > 0 && r.shadow_rays {
         list.push(format!("shadows={}", settings.shadows.name()));
     }
+    let mut say = |name: &str, values: Vec<String>| {
+        let values: BTreeSet<String> = values.into_iter().map(|v| v.replace(' ', "")).collect();
+        if !values.is_empty() {
+            list.push(format!("{name}={}", Vec::from_iter(values).join(",")));
+        }
+    };
+    if settings.integrator == IntegratorKind::Ao {
+        say("ao_distance", settings.ao_distance.iter().map(ToString::to_string).collect());
+    } else {
+        let models = scene.fresnel_models().filter(|model| *model != FresnelModel::Exact);
+        say("fresnel", models.map(|model| model.name().to_owned()).collect());
+        let filters = scene.texture_filters().filter(|filter| *filter != TexelFilter::Bilinear);
+        say("texture_filter", filters.map(|filter| filter.name().to_owned()).collect());
+        let single = settings.wavelength.filter(|_| r.dispersive > 0);
+        say("wavelength", single.iter().map(ToString::to_string).collect());
+        if scene.fog.as_ref().is_some_and(|fog| !fog.dims_lights) {
+            say("dims_lights", vec!["false".to_owned()]);
+        }
+    }
+    say("tolerance", scene.tessellations.iter().map(|made| made.tolerance.to_string()).collect());
+    say("volume_tolerance", scene.volumes.iter().map(|v| v.tolerance().to_string()).collect());
     list.join(" ")
 }
 

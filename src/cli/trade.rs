@@ -399,11 +399,11 @@ fn print_report(scene: &str, report: &TradeReport) {
         percent(half.error),
         half.beyond,
         half.half.zip(half.float).map_or_else(String::new, |(half, float)| format!(
-            "; {:.4} s and {} to write, of float {:.4} s and {}",
+            "; {:.4} s to write, {:.0} kB; float {:.4} s, {:.0} kB",
             half.seconds,
-            megabytes(half.bytes),
+            half.bytes as f64 / 1e3,
             float.seconds,
-            megabytes(float.bytes)
+            float.bytes as f64 / 1e3
         ))
     ));
     print("* nothing measured is both faster and better");

@@ -27,6 +27,15 @@ pub struct FresnelPower {
 }
 
 impl FresnelModel {
+    /// Its name in scene files; the power law has none there but its numbers.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Schlick => "schlick",
+            Self::Power(_) => "power",
+        }
+    }
+
     /// Share of unpolarised light that is reflected where the cosines of the angles to the normal are
     /// `cos_i` on the side of index `n_i`, and `cos_t` beyond, on the side of index `n_t`.
     #[inline]

@@ -1,5 +1,5 @@
 //! How far a picture is from a reference: error metrics over pixels, and FLIP (`flip.rs`). Sums are in
-//! f64. This part knows pictures, not files, and not how they were made. And how fast and how right
+//! f64. That part knows pictures, not files, and not how they were made. And how fast and how right
 //! accelerators are on a scene's own rays ([`mod@bench`]), and what speed costs in accuracy
 //! ([`mod@trade`]).
 

@@ -22,7 +22,7 @@ use crate::accel::{Accel, AccelError, AccelKind, BuildOptions, Hit, MemoryEstima
 use crate::camera::{Camera, Lens, Pose, Projection};
 use crate::color::Rgb;
 use crate::light::{Light, LightTree};
-use crate::material::Material;
+use crate::material::{FresnelModel, Material, Phong};
 use crate::math::Bounds;
 use crate::medium::volume::Volume;
 use crate::medium::{Fog, FogProfile, Interior};
@@ -545,6 +545,18 @@ impl Scene {
     /// How textures that are pictures are filtered, each.
     pub fn texture_filters(&self) -> impl Iterator<Item = TexelFilter> {
         self.maps.iter().flat_map(Maps::texture_filters)
+    }
+
+    /// By which law each material reflects that reflects by one.
+    pub fn fresnel_models(&self) -> impl Iterator<Item = FresnelModel> {
+        self.materials.iter().filter_map(|material| match material {
+            Material::Dielectric(glass) => Some(glass.fresnel),
+            Material::Conductor(metal) => Some(metal.fresnel),
+            Material::Mirror { fresnel, .. } | Material::Phong(Phong { fresnel, .. }) => {
+                fresnel.map(|law| law.model)
+            }
+            Material::Diffuse { .. } => None,
+        })
     }
 
     /// What there is to hit.

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use super::{Point, TradeReport};
+use super::page::percent;
+use super::{Point, TradeReport, counted};
 use crate::measure::html::escaped;
 
 const SIZE: [f64; 2] = [900.0, 460.0];
@@ -70,12 +71,12 @@ pub(super) fn error_by_seconds(report: &TradeReport) -> String {
     let mark = |(name, colour, p): (String, _, &Point)| Mark {
         at: at(p),
         colour,
-        title: format!("{name}: {} in {:.3} s", super::page::percent(p.error), p.seconds),
+        title: format!("{name}: {} in {:.3} s", percent(p.error), p.seconds),
         name: p.is_on_front.then_some(name),
         is_ringed: p.is_on_front,
     };
     let own = own(report);
-    let samples = own.iter().map(|p| (format!("{} samples", p.samples), OWN, *p));
+    let samples = own.iter().map(|p| (counted(p.samples), OWN, *p));
     let marks = samples.chain(coloured(report)).map(mark).collect();
     let line = Line { points: own.iter().map(|p| at(p)).collect(), colour: OWN, is_dashed: false };
     Chart { units: [" s", " %"], marks, lines: vec![line] }.svg()
@@ -101,7 +102,7 @@ pub(super) fn error_by_samples(report: &TradeReport) -> String {
     let mark = |(name, colour, p): (String, _, &Point)| Mark {
         at: [f64::from(p.samples), 100.0 * p.error],
         colour,
-        title: format!("{name}: {} with {} samples", super::page::percent(p.error), p.samples),
+        title: format!("{name}: {} with {} samples", percent(p.error), p.samples),
         name: (colour != OWN && p.samples != report.base.samples).then_some(name),
         is_ringed: false,
     };
@@ -123,8 +124,10 @@ pub(super) fn memory_by_seconds(report: &TradeReport) -> String {
         name: Some(name),
         is_ringed: false,
     };
-    let differs = |p: &Point| p.bytes.abs_diff(base.bytes) as f64 > 0.02 * base.bytes as f64;
-    let turned: Vec<_> = coloured(report).filter(|(.., p)| differs(p)).collect();
+    // Embree's own differs by some percent from build to build.
+    let differs = |p: &Point| p.bytes.abs_diff(base.bytes) as f64 > 0.05 * base.bytes as f64;
+    let turned = coloured(report).filter(|(.., p)| p.samples == base.samples && differs(p));
+    let turned: Vec<_> = turned.collect();
     if turned.is_empty() {
         return String::new();
     }
@@ -192,21 +195,10 @@ impl Chart {
                 places.join(" ")
             );
         }
-        for mark in &self.marks {
-            let ring = if mark.is_ringed { " stroke=\"#1b1f24\" stroke-width=\"2\"" } else { "" };
-            let _ = writeln!(
-                svg,
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"4.5\" fill=\"{}\"{ring}><title>{}</title></circle>",
-                x(mark.at[0]),
-                y(mark.at[1]),
-                mark.colour,
-                escaped(&mark.title)
-            );
-        }
         let mut named: Vec<_> =
             self.marks.iter().filter_map(|mark| Some((mark, mark.name.as_ref()?))).collect();
         named.sort_by(|a, b| b.0.at[1].total_cmp(&a.0.at[1]));
-        // Names keep off each other.
+        // Names keep off each other, and lie under the marks.
         let mut lowest = f64::NEG_INFINITY;
         for (mark, name) in named {
             lowest = (y(mark.at[1]) + 4.0).max(lowest + 13.0);
@@ -218,17 +210,29 @@ impl Chart {
                 escaped(name)
             );
         }
+        for mark in &self.marks {
+            let ring = if mark.is_ringed { " stroke=\"#1b1f24\" stroke-width=\"2\"" } else { "" };
+            let _ = writeln!(
+                svg,
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"4.5\" fill=\"{}\"{ring}><title>{}</title></circle>",
+                x(mark.at[0]),
+                y(mark.at[1]),
+                mark.colour,
+                escaped(&mark.title)
+            );
+        }
         svg + "</svg>\n"
     }
 }
 
-/// 1, 2 and 5 of each decade between two powers of ten; of many decades the powers alone, and of less than
-/// one more.
+/// 1, 2 and 5 of each decade between two powers of ten; of many decades the powers alone, of less than one
+/// more.
 fn ticks(low: f64, high: f64) -> Vec<f64> {
     let steps: &[f64] = match high - low {
         range if range > 2.5 => &[1.0],
         range if range > 0.9 => &[1.0, 2.0, 5.0],
-        _ => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
+        range if range > 0.35 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
+        _ => &[1.0, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],
     };
     let decades = low.floor() as i32..=high.ceil() as i32;
     let all = decades.flat_map(|d| steps.iter().map(move |s| (s, d)));

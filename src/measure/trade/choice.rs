@@ -119,8 +119,7 @@ pub struct Knob {
 pub fn knobs(scene: &Scene, base: &Choice) -> Vec<Knob> {
     let r = &scene.requirements;
     let settings = &base.settings;
-    let has_tree =
-        settings.integrator == IntegratorKind::Whitted && (r.mirrors > 0 || r.dielectrics > 0);
+    let has_tree = has_tree(scene);
     let traces_more = has_tree || r.shadow_rays || settings.integrator == IntegratorKind::Ao;
     let mut knobs = Vec::new();
     let mut add = |name, effect, choices: Vec<(String, Choice)>| {
@@ -217,6 +216,12 @@ pub fn knobs(scene: &Scene, base: &Choice) -> Vec<Knob> {
     add("accel", Effect::Bias, kinds.collect());
     add("packets", Effect::Bias, vec![("none".into(), with(&|c| c.single_rays = true))]);
     knobs
+}
+
+/// Whether rays of it branch.
+pub(super) fn has_tree(scene: &Scene) -> bool {
+    let r = &scene.requirements;
+    scene.settings.integrator == IntegratorKind::Whitted && (r.mirrors > 0 || r.dielectrics > 0)
 }
 
 /// The largest extent of what has one, in metres.

@@ -22,6 +22,7 @@ pub use files::{FileCost, HalfLoss};
 pub use page::{html, quoted};
 pub use recommend::{Recommendation, Target};
 
+use choice::has_tree;
 use convergence::{numbers_of_samples, slope};
 use files::half_loss;
 
@@ -251,6 +252,15 @@ pub fn reference(
         return Err(TradeError::Interrupted);
     }
     let error = rendered.film.relative_error().unwrap_or(0.0);
+    // Told is what matters.
+    let (told, own) = (&mut choice.settings, &base.settings);
+    if scene.tessellations.is_empty() {
+        told.tolerance = own.tolerance;
+    }
+    if !has_tree(&scene) {
+        told.max_depth = own.max_depth;
+        (told.prune, told.roulette) = (own.prune, own.roulette);
+    }
     let flags = choice.flags(base).join(" ");
     let volumes =
         if desc.volumes.is_empty() { "" } else { ", and a tenth of the volumes' tolerance" };
@@ -300,7 +310,7 @@ pub fn trade(
     for samples in numbers_of_samples(base.settings.samples, options.reference_samples) {
         let mut choice = base.clone();
         choice.settings.samples = samples;
-        convergence.push(trade.measure(&format!("{samples} samples"), &choice, &beside)?);
+        convergence.push(trade.measure(&counted(samples), &choice, &beside)?);
     }
     let slope = slope(convergence.iter().chain([&base_point]));
 
@@ -457,6 +467,11 @@ fn adaptive(base: &Choice, point: &Point) -> Option<Knob> {
 fn three_digits(x: f64) -> f64 {
     let power = 10f64.powf(2.0 - x.log10().floor());
     (x * power).floor() / power
+}
+
+/// "1 sample", "4 samples".
+fn counted(samples: u32) -> String {
+    if samples == 1 { "1 sample".to_owned() } else { format!("{samples} samples") }
 }
 
 fn median(values: &[f64]) -> f64 {

@@ -83,10 +83,10 @@ fn half_or_float(half: &HalfLoss) -> String {
     if let (Some(a), Some(b)) = (half.half, half.float) {
         text += "<table><tr><th>file</th><th>seconds to write</th><th>size</th></tr>\n";
         for (name, cost) in [("half", a), ("float", b)] {
-            let megabytes = cost.bytes as f64 / 1e6;
+            let kilobytes = cost.bytes as f64 / 1e3;
             let _ = writeln!(
                 text,
-                "<tr><td>{name}</td><td>{:.4}</td><td>{megabytes:.2} MB</td></tr>",
+                "<tr><td>{name}</td><td>{:.4}</td><td>{kilobytes:.0} kB</td></tr>",
                 cost.seconds
             );
         }

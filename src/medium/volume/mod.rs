@@ -36,6 +36,11 @@ pub struct Volume {
 }
 
 impl Volume {
+    /// How much of its brightest colour a step may be off by before it is halved.
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
     /// `grid` with its first and last samples on the faces of `bounds`, seen through `world_from_object`,
     /// which must not be singular. `tolerance` is how much of the brightest colour a step may be off by
     /// before it is halved, > 0.
