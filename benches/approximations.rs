@@ -4,7 +4,7 @@
 //! median of the ratios of times says what an approximation buys; the difference of two pictures of many
 //! samples with the same random numbers what it costs, and the ratio of the errors at a few samples,
 //! against a picture with other random numbers, what becomes of the noise. With `ALHAZEN_DOCS=1` the table
-//! is written into the page.
+//! is written into the page. Arguments are parts of the names of rows: these alone, and the page stays.
 #![allow(clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
 
 mod common;
@@ -218,7 +218,7 @@ fn rows() -> Vec<Row> {
             row.choices[0].1 = leak(glass_by(r#""schlick""#));
             row.choices[1].1 = leak(glass_by("{ offset = 0.04, scale = 0.96, power = 5.0 }"));
         }
-        if row.name.starts_with("`filter`") {
+        if row.name.starts_with("`filter`, of a texture") {
             row.accurate.1 = leak(image("bilinear"));
             row.choices[0].1 = leak(image("mip"));
             row.choices[1].1 = leak(image("nearest"));
@@ -268,7 +268,9 @@ fn main() {
          |---|---|---|---|---|---|---|\n",
     );
     print!("{table}");
-    for row in rows() {
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let is_wanted = |row: &Row| wanted.is_empty() || wanted.iter().any(|w| row.name.contains(w));
+    for row in rows().into_iter().filter(is_wanted) {
         let is_samples = row.name == "`samples`";
         let (from, accurate) = (row.accurate.0, &row.accurate.1);
         let few = if is_samples { 16 } else { 4 };
@@ -303,7 +305,7 @@ fn main() {
             table.push_str(&line);
         }
     }
-    if std::env::var_os("ALHAZEN_DOCS").is_some_and(|value| value == "1") {
+    if wanted.is_empty() && std::env::var_os("ALHAZEN_DOCS").is_some_and(|value| value == "1") {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/approximations.md");
         let page = std::fs::read_to_string(&path).expect("the page exists");
         let (head, rest) = page.split_once("<!-- TABLE -->\n").expect("it has a mark");
