@@ -12,7 +12,7 @@ use alhazen::film::Picture;
 use alhazen::integrator::{Tree, Whitted};
 use alhazen::measure::{CompareOptions, compare};
 use alhazen::render::{RenderJob, render};
-use alhazen::scene::{Scene, Shadows};
+use alhazen::scene::{Hollows, Scene, Shadows};
 use common::record::{Query, record};
 use common::{median, peers, seconds, w2};
 use rayon::prelude::*;
@@ -122,7 +122,10 @@ fn against_mitsuba(scene: &Scene) {
 /// Whole renders, by Embree and by our own hierarchy (`other`), and what Embree takes for the queries alone.
 fn measure<Q: RayQuery>(scene: &Scene, query: &Q, other: &Scene) {
     let whitted = Whitted::<Tree>::new(Some(scene.settings.max_depth));
-    let (queries, counts) = record(scene, query, &whitted);
+    // As whoever asks for every ray of the tree, those within spheres too.
+    let mut asking = w2::scene(|_| ());
+    asking.hollows = Hollows::default();
+    let (queries, counts) = record(&asking, query, &whitted);
     println!(
         "{} camera, {} shadow, {} reflection, {} refraction rays; {:.1} % in packets",
         counts.camera,

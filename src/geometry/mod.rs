@@ -35,4 +35,4 @@ pub(crate) use shapes::with_shapes;
 pub use shapes::{PlacedShape, Shapes};
 pub use sphere::Sphere;
 pub use torus::Torus;
-pub use triangle::{TriangleHit, intersect_triangle};
+pub use triangle::{TriangleHit, distance_to_triangle, intersect_triangle};

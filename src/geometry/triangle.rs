@@ -44,6 +44,22 @@ pub fn intersect_triangle(
     (t > t_min && t <= t_max).then(|| TriangleHit { t, u: wb / sum, v: wc / sum })
 }
 
+/// Distance of a point from a triangle (Ericson, *Real-Time Collision Detection*, §5.1.5).
+pub fn distance_to_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> f64 {
+    let normal = (b - a).cross(c - a);
+    let inside = |from: DVec3, to: DVec3| (to - from).cross(p - from).dot(normal) >= 0.0;
+    if normal != DVec3::ZERO && inside(a, b) && inside(b, c) && inside(c, a) {
+        return (p - a).dot(normal).abs() / normal.length();
+    }
+    let to_edge = |from: DVec3, to: DVec3| {
+        let along = to - from;
+        let t = (p - from).dot(along) / along.length_squared();
+        let t = if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 };
+        (p - (from + along * t)).length()
+    };
+    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

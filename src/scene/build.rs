@@ -6,9 +6,11 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3};
 
 use super::desc::{
-    CameraDesc, LensDesc, Location, PlaceDesc, Reference, RenderSettings, SceneDesc, Tolerance,
+    CameraDesc, IntegratorKind, LensDesc, Location, PlaceDesc, Reference, RenderSettings,
+    SceneDesc, Tolerance,
 };
 use super::draft::{GeometryLooks, Look};
+use super::hollow::{Hollows, SphereId};
 use super::lights::{
     Emission, add_surfaces, default_lights, glowing_objects, is_hidden, written_lights,
 };
@@ -68,6 +70,8 @@ pub struct Scene {
     pub memory_estimate: MemoryEstimate,
     /// Whether it is of the compact form.
     pub is_compact: bool,
+    /// Spheres of glass within which a ray needs no query.
+    pub hollows: Hollows,
     pub(super) world: World,
     pub(super) materials: Vec<Material>,
     /// What each material gives off; none where none does.
@@ -460,6 +464,7 @@ impl Scene {
             accel,
             memory_estimate,
             is_compact: options.compact,
+            hollows: Hollows::default(),
             world,
             materials,
             emissions,
@@ -473,6 +478,15 @@ impl Scene {
         };
         if scene.requirements.dielectrics > 0 {
             scene.camera_interior = scene.interior_at(scene.camera.pose().eye);
+        }
+        if scene.settings.integrator == IntegratorKind::Whitted
+            && scene.requirements.dielectrics > 0
+        {
+            let is_glass = |id: SphereId| {
+                let look = scene.root_looks[id.geometry as usize].of(id.primitive);
+                matches!(scene.materials[look.material as usize], Material::Dielectric(_))
+            };
+            scene.hollows = Hollows::of(&scene.world, is_glass);
         }
         Ok(scene)
     }

@@ -8,6 +8,7 @@
 mod build;
 mod desc;
 mod draft;
+mod hollow;
 mod lights;
 mod maps;
 mod media;
@@ -26,6 +27,7 @@ pub use desc::{
     MaterialDesc, ObjectDesc, PlaceDesc, PrototypeDesc, Reference, RenderSettings, SceneDesc,
     Shadows, ShapeDesc, Tolerance,
 };
+pub use hollow::{FarSide, Hollows};
 pub use maps::{Cone, Maps};
 pub use media::Crossing;
 pub use requirements::{Requirements, Variant};

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::build::Scene;
+use super::hollow::{FarSide, SphereId};
 use crate::accel::{Geometry, Hit, Transform3x4, affine_from_rows};
 use crate::geometry::{AnalyticShape, Shapes, Sphere, TriangleMesh, with_shapes};
 use crate::material::Material;
@@ -28,7 +29,7 @@ pub struct SurfacePoint<'a> {
     /// The scene's number of that material.
     pub material_index: u32,
     /// The sphere that it lies on, where that is no copy.
-    pub(super) sphere: Option<&'a Sphere>,
+    pub(super) sphere: Option<(&'a Sphere, SphereId)>,
 }
 
 /// Position, error, outward geometric and shading normal (of unit length, or zero where there is none)
@@ -83,7 +84,10 @@ impl Scene {
                 is_front,
                 material: &self.materials[material_index as usize],
                 material_index,
-                sphere: Some(sphere),
+                sphere: Some((
+                    sphere,
+                    SphereId { geometry: hit.geometry, primitive: hit.primitive },
+                )),
             };
         }
         self.surface_of_any(ray, hit)
@@ -136,20 +140,22 @@ impl Scene {
     }
 
     /// The ray that leaves `point` into `direction` (unit length) for whatever comes. Within a sphere it will
-    /// come to its far side, so that nothing beyond needs to be looked at: what it hits is the same.
+    /// come to its far side, so that nothing beyond needs to be looked at: what it hits is the same. Where
+    /// nothing can be in between either, it is known that it hits that side.
     #[inline]
-    pub fn spawn_on(&self, point: &SurfacePoint<'_>, direction: Vec3) -> Ray {
+    pub fn spawn_on(&self, point: &SurfacePoint<'_>, direction: Vec3) -> (Ray, Option<FarSide>) {
         let mut ray = self.spawn(point, direction, f32::INFINITY);
-        if let Some(sphere) = point.sphere
+        if let Some((sphere, id)) = point.sphere
             && (direction.dot(point.geometric_normal) < 0.0) == point.is_front
         {
             let (o, d) = (ray.origin.as_dvec3(), direction.as_dvec3());
             // By the arithmetic that queries use.
             if let Some(far) = sphere.intersect(o, d, ray.t_min.into(), f64::INFINITY) {
                 ray.t_max = (far.t as f32).next_up();
+                return (ray, self.hollows.holds(id).then_some(FarSide(id)));
             }
         }
-        ray
+        (ray, None)
     }
 }
 
@@ -337,7 +343,7 @@ mod tests {
                     1 => (unit().cross(n).normalize_or(-n) - n * 1e-4).normalize(),
                     _ => (unit() + n * 1.1).normalize(),
                 };
-                let on = scene.spawn_on(&point, w);
+                let (on, _) = scene.spawn_on(&point, w);
                 let endless = scene.spawn(&point, w, f32::INFINITY);
                 assert_eq!((on.origin, on.t_min), (endless.origin, endless.t_min));
                 assert_eq!(query.intersect(&on), query.intersect(&endless), "{kind:?}: {on:?}");

@@ -26,7 +26,7 @@ use crate::material::Material;
 use crate::math::Ray;
 use crate::medium::{Interior, beer_lambert};
 use crate::sampler::Sampler;
-use crate::scene::{Cone, Scene, SurfacePoint};
+use crate::scene::{Cone, FarSide, Scene, SurfacePoint};
 use scatter::Way;
 
 /// What a compiled variant knows of.
@@ -156,6 +156,8 @@ struct Node {
     lane: u8,
     /// How it left its parent.
     way: Way,
+    /// What it comes to, where no query is needed to know it.
+    known: Option<FarSide>,
     /// What of its way lies before its origin, where it did not begin there.
     before: f32,
 }
@@ -272,6 +274,7 @@ impl<F: Features> Whitted<F> {
                 passed: 0,
                 lane: lane as u8,
                 way: Way::Refracted,
+                known: None,
                 before: if F::EVERYTHING { way_before(scene, &ray) } else { 0.0 },
             }
         });
@@ -296,7 +299,10 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     fn run(&mut self) {
         loop {
             while let Some(node) = self.stack.pop() {
-                let hit = self.query.intersect(&node.ray);
+                let hit = match node.known {
+                    Some(side) => Some(side.hit(&node.ray)),
+                    None => self.query.intersect(&node.ray),
+                };
                 self.shade(1, std::array::from_ref(&node), |_| hit.as_ref());
             }
             let Some(block) = self.blocks.pop() else { return };

@@ -70,8 +70,9 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Traces the nodes of the stack from `start` on as blocks where they run close together.
     fn gather(&mut self, start: usize) {
         let nodes: Vec<Node> = self.stack.drain(start..).collect();
+        self.stack.extend(nodes.iter().filter(|node| node.known.is_some()));
         for way in [Way::Refracted, Way::Mirrored] {
-            let group = || nodes.iter().filter(move |node| node.way == way);
+            let group = || nodes.iter().filter(move |node| node.way == way && node.known.is_none());
             let Some(first) = group().next() else { continue };
             let is_close = |n: &Node| n.ray.direction.dot(first.ray.direction) > COHERENT_COSINE;
             if group().count() < MIN_PACKET || !group().all(is_close) {
@@ -185,12 +186,22 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             return;
         }
         self.counts.refraction += 1;
-        let ray = self.scene.spawn_on(point, node.ray.direction);
+        let (ray, known) = self.scene.spawn_on(point, node.ray.direction);
         let (passed, way) = (node.passed + 1, Way::Refracted);
         let cone = fork.cone.turned(0.0);
         let before = node.before + (point.position - node.ray.origin).length();
         let interior = beyond;
-        self.stack.push(Node { ray, throughput, interior, passed, way, cone, before, ..*node });
+        self.stack.push(Node {
+            ray,
+            throughput,
+            interior,
+            passed,
+            way,
+            cone,
+            before,
+            known,
+            ..*node
+        });
     }
 
     /// The one wavelength of a sample, in nm, and the colour that it counts for.
@@ -250,7 +261,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             Way::Mirrored => self.counts.reflection += 1,
             Way::Refracted => self.counts.refraction += 1,
         }
-        let ray = self.scene.spawn_on(fork.point, direction);
+        let (ray, known) = self.scene.spawn_on(fork.point, direction);
         self.stack.push(Node {
             ray,
             throughput,
@@ -262,6 +273,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             passed: node.passed,
             lane: node.lane,
             way,
+            known,
             before: 0.0,
         });
     }

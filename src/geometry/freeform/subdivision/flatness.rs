@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::Polygons;
 use super::limit::{Limit, cut, quad};
 use super::refine::{Rule, Surroundings, Topology, refine};
+use crate::geometry::distance_to_triangle;
 
 /// Levels that a face is refined further.
 const FURTHER: usize = 3;
@@ -94,7 +95,8 @@ fn further(mesh: &Polygons, topology: &Topology, limit: &Limit, face: usize) -> 
                 let bend = around[v as usize].sharp_neighbors - 2.0 * part.positions[v as usize];
                 thickness = thickness.max(0.125 * bend.length());
             }
-            let nearest = triangles.iter().map(|t| distance(p, t)).fold(f64::INFINITY, f64::min);
+            let nearest =
+                triangles.iter().map(|t| distance_to_triangle(p, t)).fold(f64::INFINITY, f64::min);
             off = off.max(nearest);
         }
         let hull = hull_thickness(&part, &limit, f);
@@ -164,20 +166,4 @@ fn neighborhood(mesh: &Polygons, topology: &Topology, limit: &Limit, own: &[usiz
         creases,
         pinned,
     }
-}
-
-/// Distance of a point from a triangle (Ericson, *Real-Time Collision Detection*, §5.1.5).
-fn distance(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> f64 {
-    let normal = (b - a).cross(c - a);
-    let inside = |from: DVec3, to: DVec3| (to - from).cross(p - from).dot(normal) >= 0.0;
-    if normal != DVec3::ZERO && inside(a, b) && inside(b, c) && inside(c, a) {
-        return (p - a).dot(normal).abs() / normal.length();
-    }
-    let to_edge = |from: DVec3, to: DVec3| {
-        let along = to - from;
-        let t = (p - from).dot(along) / along.length_squared();
-        let t = if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 };
-        (p - (from + along * t)).length()
-    };
-    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
 }
