@@ -183,7 +183,7 @@ impl Judge<'_> {
     /// ray that grazes a surface meets it far off. More where the rays are `aside` of each other.
     fn tolerance(&self, ray: &Ray, hit: &Hit, aside: f32) -> f32 {
         let point = self.scene.surface(ray, hit);
-        let cosine = point.geometric_normal.dot(ray.direction).abs().max(1e-3);
+        let cosine = point.geometric_normal.dot(ray.direction).abs().max(1e-5);
         let way = ray.origin.abs().max_element() + hit.t;
         (4.0 * point.error + 16.0 * f32::EPSILON * way + aside) / cosine
     }
