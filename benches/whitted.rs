@@ -127,12 +127,13 @@ fn measure<Q: RayQuery>(scene: &Scene, query: &Q, other: &Scene) {
     asking.hollows = Hollows::default();
     let (queries, counts) = record(&asking, query, &whitted);
     println!(
-        "{} camera, {} shadow, {} reflection, {} refraction rays; {:.1} % in packets",
+        "{} camera, {} shadow, {} reflection, {} refraction rays; {:.1} % in packets; {} balls are hollow",
         counts.camera,
         counts.shadow,
         counts.reflection,
         counts.refraction,
-        100.0 * queries.iter().map(Query::in_packet).sum::<u64>() as f64 / counts.total() as f64
+        100.0 * queries.iter().map(Query::in_packet).sum::<u64>() as f64 / counts.total() as f64,
+        scene.hollows.len()
     );
     let whole = || {
         std::hint::black_box(render(scene, &RenderJob::default(), &()));
