@@ -149,21 +149,36 @@ fn measure<Q: RayQuery>(scene: &Scene, query: &Q, other: &Scene) {
     let whole_of_ours = || {
         std::hint::black_box(render(other, &RenderJob::default(), &()));
     };
-    let works: [(&str, &dyn Fn()); 4] = [
+    let whole_by_asking = || {
+        std::hint::black_box(render(&asking, &RenderJob::default(), &()));
+    };
+    let mut asking_ours = w2::scene_in(AccelKind::Bvh, |_| ());
+    asking_ours.hollows = Hollows::default();
+    let whole_of_ours_by_asking = || {
+        std::hint::black_box(render(&asking_ours, &RenderJob::default(), &()));
+    };
+    let works: [(&str, &dyn Fn()); 6] = [
         ("whole render", &whole),
         ("its queries", &replay),
         ("one by one", &singles),
         ("whole by bvh", &whole_of_ours),
+        ("whole by asking for every ray", &whole_by_asking),
+        ("by bvh, asking for every ray", &whole_of_ours_by_asking),
     ];
-    let rounds: Vec<[f64; 4]> =
+    let rounds: Vec<[f64; 6]> =
         (0..=ROUNDS).map(|_| works.map(|(_, work)| seconds(work))).skip(1).collect();
     for (i, (name, _)) in works.iter().enumerate() {
         let time = median(rounds.iter().map(|r| r[i]).collect());
         let speed = counts.total() as f64 / time / 1e6;
-        println!("{name:>14}  {time:6.2} s  {speed:6.1} Mrays/s");
+        println!("{name:>30}  {time:6.2} s  {speed:6.1} Mrays/s");
     }
     let ratio = |i: usize, j: usize| median(rounds.iter().map(|r| r[i] / r[j]).collect());
     println!("whole render / its queries: {:.2}; target 1.3", ratio(0, 1));
     println!("whole render by bvh / its queries by Embree: {:.2}; target 1.3", ratio(3, 1));
+    println!(
+        "whole render / one that asks for rays within hollow balls too: {:.2}, by bvh {:.2}",
+        ratio(0, 4),
+        ratio(3, 5)
+    );
     println!("one by one / in packets where it traces packets: {:.2}", ratio(2, 1));
 }
