@@ -285,10 +285,7 @@ mod tests {
                 objects: vec![ObjectDesc::new(small, None)],
             });
             let transforms: Vec<_> = (0..5).map(|_| DAffine3::from_translation(point())).collect();
-            let copies = ShapeDesc::Instances {
-                prototype: Reference::new("copy"),
-                transforms: transforms.into(),
-            };
+            let copies = ShapeDesc::Instances { prototype: Reference::new("copy"), transforms };
             desc.objects.push(ObjectDesc::new(copies, None));
             for &kind in AccelKind::ALL {
                 let scene = Scene::build_quietly(desc.clone(), kind).unwrap();
