@@ -164,8 +164,8 @@ impl Number for Interval {
             return a.mul(b.recip());
         }
         let v = [a.lo / b.lo, a.lo / b.hi, a.hi / b.lo, a.hi / b.hi];
-        // ∞/∞ lies between quotients that are none.
-        Self::around(v.map(|x| if x.is_nan() { v[1] } else { x })).outward()
+        // ∞/∞ lies between 0 and an infinity: the other quotients of these bounds.
+        Self::around(v.map(|x| if x.is_nan() { 0.0 } else { x })).outward()
     }
     #[inline]
     fn shift(self, k: f64) -> Self {

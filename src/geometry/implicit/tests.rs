@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::enclosure::Enclosure;
 use super::interval::Interval;
+use super::number::Number;
 use super::*;
 
 /// Twenty times as many where there is time: in `make verify`.
@@ -219,6 +220,32 @@ fn expressions() -> impl Strategy<Value = String> {
 fn interval(e: &Expression, b: Bounds) -> Interval {
     let xyz = std::array::from_fn(|i| Interval::new(b.min[i], b.max[i]));
     e.tape.with_registers(|registers| e.tape.evaluate(xyz, registers))
+}
+
+#[test]
+fn quotients_of_bounds_without_end_hold_every_value() {
+    let x = |lo, hi| Interval::new(lo, hi);
+    let inf = f64::INFINITY;
+    for (a, b, lo, hi) in [
+        (x(-inf, 2.0), x(0.5, inf), -inf, 4.0),
+        (x(-inf, 2.0), x(-inf, -0.5), -4.0, inf),
+        (x(3.0, inf), x(0.5, inf), 0.0, inf),
+        (x(-inf, -3.0), x(0.5, inf), -inf, 0.0),
+        (x(-inf, inf), x(0.5, inf), -inf, inf),
+        (x(3.0, inf), x(-inf, -0.5), -inf, 0.0),
+    ] {
+        let quotient = a.div(b);
+        assert!(quotient.lo <= lo && hi <= quotient.hi, "{a:?} / {b:?} = {quotient:?}");
+        let is_close = |x: f64, y: f64| x == y || (x - y).abs() < 1e-12;
+        assert!(is_close(quotient.lo, lo) && is_close(quotient.hi, hi), "{a:?} / {b:?}: wide");
+    }
+    // Found at random.
+    let e = Expression::parse("log(y - cbrt(x)) / x^(-2)").unwrap();
+    let center = DVec3::new(-1.8109754528054354, 3.6854910596925308, 0.0);
+    let corner = DVec3::splat(7.07);
+    let range = interval(&e, Bounds { min: center - corner, max: center + corner });
+    let value = e.value(center - DVec3::Y * 4.576);
+    assert!(value < -3.0 && range.lo <= value && value <= range.hi, "{value} {range:?}");
 }
 
 proptest! {
