@@ -25,7 +25,7 @@ test: ## Runs every test, with and without Embree
 	PROPTEST_RNG_SEED=1 $(CARGO) test --locked --no-default-features
 
 verify: test slurm ## Runs what takes longer: many more random rays, scenes, seeds and kills, others each time
-	ALHAZEN_VERIFY=1 $(CARGO) test --locked --release
+	ALHAZEN_VERIFY=1 $(CARGO) test --locked --release --no-fail-fast
 
 slurm: build ## Tries the job array on a Slurm of one node, which it sets up (as root) and ends
 	./scripts/slurm/try.sh

@@ -8,8 +8,11 @@
 //! - what packets gain over single rays;
 //! - of a run of the program from its start to a picture of 64 x 36 pixels: reading by building, and all
 //!   of it by a bare build of the same arrays;
-//! - of whole renders, `exact` by `robust`. This is all that it says of the file of a MESH, and of the house
-//!   of 1.5 million triangles where the assets are there.
+//! - of whole renders, `exact` by `robust`;
+//! - of builds with the renders after them, `build_quality = "auto"` by the best of the fixed choices.
+//!
+//! The last two are all that it says of the file of a MESH, and of the house of 1.5 million triangles where the
+//! assets are there.
 #![allow(clippy::print_stdout, missing_docs, reason = "a benchmark prints")]
 
 mod common;
@@ -22,7 +25,7 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
 
-use alhazen::accel::{Accel, AccelKind, EmbreeAccel, Geometry, Precision, RayBlock};
+use alhazen::accel::{Accel, AccelKind, BuildQuality, EmbreeAccel, Geometry, Precision, RayBlock};
 use alhazen::camera::Projection;
 use alhazen::color::Rgb;
 use alhazen::embree::{
@@ -69,31 +72,29 @@ fn main() {
         );
         rays(&path);
         from_file(&path);
-        ladder(|precision| {
-            let mut desc = desc(&path, IntegratorKind::Direct);
-            desc.settings.precision = precision;
-            desc
-        });
+        let of_path = || desc(&path, IntegratorKind::Direct);
+        ladder(&of_path);
+        qualities(&of_path);
         std::fs::remove_file(&path).expect("it is there");
     }
     for path in meshes {
         println!("{}", path.display());
-        ladder(|precision| {
-            let mut desc = load_scene(&path, &LoadOptions::default()).expect("a mesh").scene;
-            desc.settings.precision = precision;
-            desc
-        });
+        let of_path = || load_scene(&path, &LoadOptions::default()).expect("a mesh").scene;
+        ladder(&of_path);
+        qualities(&of_path);
     }
 }
 
 /// What `exact` takes by `robust`, of a scene with shadows and of the open sky's light: builds, and renders
 /// of 1280 x 720 pixels with 4 samples.
-fn ladder(desc: impl Fn(Precision) -> SceneDesc) {
+fn ladder(desc: &dyn Fn() -> SceneDesc) {
     for (name, integrator) in
         [("direct light", IntegratorKind::Direct), ("ambient occlusion", IntegratorKind::Ao)]
     {
         let build = |precision| {
-            let mut desc = desc(precision);
+            let mut desc = desc();
+            desc.settings.precision = precision;
+            desc.settings.build_quality = BuildQuality::Medium;
             desc.settings.integrator = integrator;
             desc.image.size = [1280, 720];
             desc.settings.samples = 4;
@@ -113,6 +114,38 @@ fn ladder(desc: impl Fn(Precision) -> SceneDesc) {
     }
 }
 
+/// Build and render at 1920 x 1080 under direct light, by accelerator and number of samples: with the quality
+/// that `auto` takes, by the best of the others. With `robust`, high is medium.
+fn qualities(desc: &dyn Fn() -> SceneDesc) {
+    const QUALITIES: [BuildQuality; 3] =
+        [BuildQuality::Low, BuildQuality::Medium, BuildQuality::Auto];
+    const ROUNDS: usize = 5;
+    for kind in [AccelKind::Embree, AccelKind::Bvh] {
+        for samples in [1, 2, 4, 8, 16] {
+            let run = |build_quality| {
+                let mut desc = desc();
+                desc.settings.build_quality = build_quality;
+                desc.settings.integrator = IntegratorKind::Direct;
+                desc.image.size = [1920, 1080];
+                desc.settings.samples = samples;
+                let start = Instant::now();
+                let scene = Scene::build_quietly(desc, kind).expect("a sound scene");
+                drop(black_box(render(&scene, &RenderJob::default(), &())));
+                start.elapsed().as_secs_f64()
+            };
+            let rounds: Vec<_> = (0..ROUNDS).map(|_| QUALITIES.map(run)).collect();
+            let time = |i: usize| median(rounds.iter().map(|round| round[i]).collect());
+            let [low, medium, auto] = [time(0), time(1), time(2)];
+            println!(
+                "  build and render, {}, {samples} samples: low {low:.2} s, medium {medium:.2} s, auto by the \
+                 best of them {:.2}; target 1.05",
+                kind.name(),
+                auto / low.min(medium)
+            );
+        }
+    }
+}
+
 /// The terrain of a file, seen from a corner under a low sun.
 fn scene(path: &Path, integrator: IntegratorKind) -> Scene {
     Scene::build_quietly(desc(path, integrator), AccelKind::default()).expect("a sound scene")
@@ -123,6 +156,8 @@ fn desc(path: &Path, integrator: IntegratorKind) -> SceneDesc {
     desc.image.size = [1920, 1080];
     desc.settings.samples = 1;
     desc.settings.filter = Filter::Box;
+    // As the bare scenes beside it.
+    desc.settings.build_quality = BuildQuality::Medium;
     desc.settings.integrator = integrator;
     desc.camera = Some(CameraDesc {
         at: Location::default(),

@@ -478,3 +478,101 @@ fn rows_and_matrices_are_the_same_thing() {
         assert!((m.transform_point3(p) - back.transform_point3(p)).length() < 1e-5);
     }
 }
+
+/// A large mesh, and copies of another in two sets.
+fn large_world() -> World {
+    let mut random = Random(7);
+    let mut large = || {
+        let mut mesh = triangle_soup(&mut random, 1 << 17);
+        let mut triangles = mesh.triangles.to_vec();
+        // Each triangle is there twice: which of the two is seen tells one hierarchy from another.
+        triangles.extend(triangles.clone());
+        mesh.triangles = Arc::new(triangles);
+        Group { geometries: vec![Geometry::Mesh(mesh)], clear: Vec::new() }
+    };
+    let [root, prototype] = [large(), large()];
+    let sets = (0..2).map(|_| {
+        let rows = (0..3).map(|_| rows_from_affine(&affine(&mut Random(8)))).collect();
+        InstanceSet { prototype: 0, transforms: Arc::new(rows) }
+    });
+    World { root, prototypes: vec![prototype], sets: sets.collect() }
+}
+
+#[cfg(feature = "embree")]
+#[test]
+fn auto_builds_what_suits_the_rays() {
+    use alhazen::accel::BuildQuality;
+
+    let world = large_world();
+    let alone = World { root: world.root.clone(), ..World::default() };
+    let mut two = alone.clone();
+    two.root.geometries.extend(alone.root.geometries.clone());
+    let few = BuildOptions { expected_rays: Some(100_000), ..BuildOptions::default() };
+    assert_eq!(few.quality_of(&alone, &alone.root), BuildQuality::Low);
+    assert_eq!(few.quality_of(&world, &world.prototypes[0]), BuildQuality::Low);
+    // Where it would not be the same on any number of threads.
+    assert_eq!(few.quality_of(&world, &world.root), BuildQuality::Medium);
+    assert_eq!(few.quality_of(&two, &two.root), BuildQuality::Medium);
+    for other in [
+        BuildOptions { expected_rays: Some(100_000_000), ..few.clone() },
+        BuildOptions { expected_rays: None, ..few.clone() },
+        BuildOptions { compact: true, ..few.clone() },
+        // These are of our own hierarchy, which gains nothing.
+        BuildOptions { kind: AccelKind::Bvh, ..few.clone() },
+        BuildOptions { precision: Precision::Exact, ..few.clone() },
+    ] {
+        assert_eq!(other.quality_of(&alone, &alone.root), BuildQuality::Medium, "{other:?}");
+    }
+    for quality in [BuildQuality::Low, BuildQuality::Medium, BuildQuality::High] {
+        let asked = BuildOptions { quality, ..few.clone() };
+        assert_eq!(asked.quality_of(&two, &two.root), quality);
+    }
+    let small = World {
+        root: Group {
+            geometries: vec![Geometry::Mesh(triangle_soup(&mut Random(1), 1000))],
+            clear: Vec::new(),
+        },
+        ..World::default()
+    };
+    assert_eq!(few.quality_of(&small, &small.root), BuildQuality::Medium);
+}
+
+/// What is quick to build takes a little more memory.
+#[cfg(feature = "embree")]
+#[test]
+fn auto_builds_what_there_is_memory_for() {
+    use alhazen::accel::{BuildQuality, Compact};
+
+    let world = World { root: large_world().root, ..World::default() };
+    let mut options = BuildOptions { expected_rays: Some(1), ..BuildOptions::default() };
+    let low = options.fit(&world, Compact::Auto).unwrap();
+    assert_eq!(options.quality_of(&world, &world.root), BuildQuality::Low);
+    options.memory_limit = Some(low.peak - 1);
+    let medium = options.fit(&world, Compact::Auto).unwrap();
+    assert_eq!(options.quality_of(&world, &world.root), BuildQuality::Medium);
+    assert!(medium.peak < low.peak && !options.compact, "{medium:?} {low:?}");
+}
+
+/// Embree does not promise it of what is quick to build; for a mesh by itself it holds.
+#[test]
+fn what_auto_builds_is_the_same_on_any_number_of_threads() {
+    let copies = large_world();
+    let alone = World { root: copies.root.clone(), ..World::default() };
+    let mut random = Random(9);
+    let rays: Vec<Ray> = (0..5000).map(|_| random_ray(&mut random)).collect();
+    let kinds = AccelKind::ALL.iter().filter(|kind| **kind != AccelKind::Brute);
+    for (&kind, world) in kinds.flat_map(|kind| [(kind, &alone), (kind, &copies)]) {
+        let hits = |threads| {
+            let (expected_rays, threads) = (Some(1), Some(threads));
+            let options = BuildOptions { kind, expected_rays, threads, ..BuildOptions::default() };
+            let accel = Accel::build(world, &options, &|_| true).unwrap();
+            let query = accel.query();
+            rays.iter().map(|ray| query.intersect(ray)).collect::<Vec<_>>()
+        };
+        let first = hits(1);
+        assert!(first.iter().flatten().count() > 2000);
+        for threads in [1, 2, 2, 2, 3, 8] {
+            assert!(hits(threads) == first, "{} with {threads} threads", kind.name());
+        }
+    }
+}

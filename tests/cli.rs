@@ -334,6 +334,35 @@ fn a_memory_limit_is_an_error_not_a_crash() {
     );
 }
 
+/// How well a hierarchy is built goes by the whole picture, so that parts of it fit together.
+#[test]
+fn auto_builds_a_large_mesh_quickly_for_few_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), &["generate", "terrain", "-n", "150k", "-o", "t.ply", "-q"]);
+    let quality = |more: &[&str]| {
+        let all: Vec<&str> = ["inspect", "t.ply"].iter().chain(more).copied().collect();
+        let text = run(folder.path(), &all);
+        let (_, rest) = text.split_once(", quality ").unwrap_or_else(|| panic!("{text}"));
+        rest.split(';').next().unwrap_or_default().to_owned()
+    };
+    let few = ["--size", "640x480", "--samples", "1"];
+    let low = if cfg!(feature = "embree") { "low" } else { "medium" };
+    assert_eq!(quality(&few), low);
+    assert_eq!(quality(&["--size", "640x480", "--samples", "8"]), "medium");
+    for more in [["--accel", "bvh"], ["--precision", "exact"], ["--build-quality", "medium"]] {
+        assert_eq!(quality(&[&few[..], &more].concat()), "medium");
+    }
+    let bytes = |name: &str, more: &[&str]| {
+        let fixed = ["render", "t.ply", "--size", "96x64", "-o", name, "-q"];
+        run(folder.path(), &[&fixed[..], more].concat());
+        std::fs::read(folder.path().join(name)).unwrap()
+    };
+    let one = bytes("a.png", &["--samples", "1", "--threads", "1"]);
+    assert!(one == bytes("b.png", &["--samples", "1", "--threads", "3"]));
+    // Nor does one see how it was built.
+    assert!(one == bytes("c.png", &["--samples", "1", "--build-quality", "medium"]));
+}
+
 #[test]
 fn inspect_says_what_there_is() {
     let folder = folder();

@@ -79,7 +79,7 @@ impl EmbreeAccel {
         options: &BuildOptions,
         progress: &(dyn Fn(f64) -> bool + Sync),
     ) -> Result<Self, EmbreeError> {
-        let quality = match options.quality {
+        let quality = |group| match options.quality_of(world, group) {
             BuildQuality::Low => Quality::Low,
             BuildQuality::High => Quality::High,
             BuildQuality::Auto | BuildQuality::Medium => Quality::Medium,
@@ -103,12 +103,13 @@ impl EmbreeAccel {
 
         let mut prototypes = Vec::with_capacity(world.prototypes.len());
         for group in &world.prototypes {
-            let mut builder = SceneBuilder::new(device, flags, quality)?;
-            attach_group(&mut builder, device, group, quality)?;
+            let mut builder = SceneBuilder::new(device, flags, quality(group))?;
+            attach_group(&mut builder, device, group, quality(group))?;
             prototypes.push(commit(builder, size(group))?);
         }
-        let mut builder = SceneBuilder::new(device, flags, quality)?;
-        attach_group(&mut builder, device, &world.root, quality)?;
+        let root_quality = quality(&world.root);
+        let mut builder = SceneBuilder::new(device, flags, root_quality)?;
+        attach_group(&mut builder, device, &world.root, root_quality)?;
         let reaches: Vec<_> = world.prototypes.iter().map(Reach::of).collect();
         let first_set = world.root.geometries.len() as u32;
         let mut sets = Vec::with_capacity(world.sets.len());

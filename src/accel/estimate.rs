@@ -1,6 +1,6 @@
 //! What a structure will take, before it is built.
 
-use super::world::{Geometry, Group, World};
+use super::world::{Geometry, World};
 use super::{AccelKind, BuildOptions, BuildQuality};
 
 /// Expected bytes of an acceleration structure, beyond the arrays that it shares with the scene.
@@ -27,7 +27,7 @@ impl MemoryEstimate {
         if options.kind == AccelKind::Brute {
             return Self::default();
         }
-        let triangles = match (options.compact, options.quality) {
+        let triangles = |quality| match (options.compact, quality) {
             (true, BuildQuality::Low) => Rate { peak: 100, kept: 62 },
             (true, _) => Rate { peak: 68, kept: 36 },
             (false, BuildQuality::Low) => Rate { peak: 102, kept: 94 },
@@ -43,10 +43,12 @@ impl MemoryEstimate {
             total.peak += count as u64 * rate.peak;
             total.kept += count as u64 * rate.kept;
         };
-        let groups = world.prototypes.iter().chain([&world.root]);
-        for geometry in groups.flat_map(|group: &Group| &group.geometries) {
-            let rate = if matches!(geometry, Geometry::Mesh(_)) { &triangles } else { &SHAPE };
-            add(geometry.len(), rate);
+        for group in world.prototypes.iter().chain([&world.root]) {
+            let triangles = triangles(options.quality_of(world, group));
+            for geometry in &group.geometries {
+                let rate = if matches!(geometry, Geometry::Mesh(_)) { &triangles } else { &SHAPE };
+                add(geometry.len(), rate);
+            }
         }
         for set in &world.sets {
             add(set.transforms.len(), &COPY);

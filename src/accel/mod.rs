@@ -132,11 +132,12 @@ impl Precision {
 /// How much work goes into building the hierarchy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BuildQuality {
-    /// Medium: low builds sooner, but may not come out the same on any number of threads.
+    /// Low where that pays, as far as it comes out the same on any number of threads; else medium. See
+    /// [`BuildOptions::quality_of`].
     #[default]
     Auto,
-    /// Fast to build. Embree's may come out different from run to run with several threads, and so may
-    /// which of two coincident surfaces is hit.
+    /// Fast to build. Embree's may come out different from run to run where several threads build over
+    /// more than one mesh, and so may which of two coincident surfaces is hit.
     Low,
     /// Between the two.
     Medium,
@@ -218,6 +219,9 @@ pub struct BuildOptions {
     pub precision: Precision,
     /// How much work.
     pub quality: BuildQuality,
+    /// Rays that will be traced, which [`BuildQuality::Auto`] goes by: those that run close together count half,
+    /// as they take half the time. Many where not given.
+    pub expected_rays: Option<u64>,
     /// Threads of the build; all where not given.
     pub threads: Option<usize>,
     /// Whether the hierarchy takes half the memory, and longer to trace. Embree only.
@@ -310,7 +314,36 @@ macro_rules! with_accel {
     };
 }
 pub(crate) use with_accel;
+/// Triangles of a mesh from which on it matters how it is built.
+const LARGE: u64 = 1 << 17;
+
+/// So many rays for each triangle take as much longer as [`BuildQuality::Low`] saves: 3 to 10, by the mesh. To
+/// build too well costs more than to build too quickly: up to half as much again, where that is up to a tenth.
+// Measured by `cargo bench --bench limits`.
+const FEW_RAYS: u64 = 6;
+
 impl BuildOptions {
+    /// The quality that a group of the world is built with: [`BuildQuality::Auto`], decided. Embree takes low
+    /// for a group of one large mesh by itself, where few rays are expected for so many triangles. Over more
+    /// than that, it would not come out the same on any number of threads. Our own hierarchy gains nothing.
+    pub fn quality_of(&self, world: &World, group: &Group) -> BuildQuality {
+        #[cfg(feature = "embree")]
+        let gains = self.built_kind() == AccelKind::Embree && !self.compact;
+        #[cfg(not(feature = "embree"))]
+        let gains = false;
+        let few = |triangles: u64| self.expected_rays.is_some_and(|n| n < FEW_RAYS * triangles);
+        let is_alone = world.sets.is_empty() || !std::ptr::eq(group, &world.root);
+        match (self.quality, group.geometries.as_slice()) {
+            (BuildQuality::Auto, [Geometry::Mesh(mesh)]) if gains && is_alone => {
+                let triangles = mesh.triangles.len() as u64;
+                let is_low = triangles >= LARGE && few(triangles);
+                if is_low { BuildQuality::Low } else { BuildQuality::Medium }
+            }
+            (BuildQuality::Auto, _) => BuildQuality::Medium,
+            (quality, _) => quality,
+        }
+    }
+
     /// The structure that is built: Embree's loses some rays that meet a vertex, so that
     /// [`Precision::Exact`] is for our own.
     pub fn built_kind(&self) -> AccelKind {
@@ -327,10 +360,15 @@ impl BuildOptions {
     /// # Errors
     /// [`AccelError::NoRoom`].
     pub fn fit(&mut self, world: &World, compact: Compact) -> Result<MemoryEstimate, AccelError> {
-        let of =
-            |is_compact| MemoryEstimate::of(world, &Self { compact: is_compact, ..self.clone() });
-        let (normal, small) = (of(false), of(true));
+        let of = |options: &Self, compact| {
+            MemoryEstimate::of(world, &Self { compact, ..options.clone() })
+        };
         let room = [self.memory_limit, self.free].into_iter().flatten().min().unwrap_or(u64::MAX);
+        if of(self, false).peak > room {
+            // What is quick to build takes more.
+            self.expected_rays = None;
+        }
+        let (normal, small) = (of(self, false), of(self, true));
         self.compact = match compact {
             Compact::On => true,
             Compact::Off => false,

@@ -33,7 +33,7 @@ pub(super) fn bench(args: &BenchArgs) -> Result<Outcome, Failure> {
     let brute = AccelArgs { kind: AccelKind::Brute, single_rays: false };
     // Nothing is built for the scene itself: Embree keeps the threads of the first build, which is to be
     // one with a single thread.
-    let scene = pool.install(|| prepare::build(scene_args, &brute, loaded, 0))?;
+    let scene = pool.install(|| prepare::build(scene_args, &brute, loaded, 0, None))?;
     let options = BenchOptions {
         structures: if args.accel.is_empty() { StructureKind::all() } else { args.accel.clone() },
         threads: pool.current_num_threads(),

@@ -21,7 +21,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
     let clock = Instant::now();
     let film = prepare::film_bytes(&PixelRect::whole(loaded.scene.image.size), false);
     let pool = prepare::thread_pool(args.threads)?;
-    let scene = pool.install(|| prepare::build(args, accel, loaded, film))?;
+    let scene = pool.install(|| prepare::build(args, accel, loaded, film, None))?;
     let build = clock.elapsed().as_secs_f64();
 
     let info = scene.accel.info();
@@ -39,10 +39,11 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<Outcome, Failure> {
         (
             "estimate",
             format!(
-                "{} while it is built, {} after{}; picture {}",
+                "{} while it is built, {} after{}, quality {}; picture {}",
                 megabytes(scene.memory_estimate.peak),
                 megabytes(scene.memory_estimate.kept),
                 if scene.is_compact { ", compact" } else { "" },
+                scene.build_quality.name(),
                 megabytes(film)
             ),
         ),

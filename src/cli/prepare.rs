@@ -60,14 +60,17 @@ pub(super) fn check_memory([width, height]: [u32; 2], film: u64) -> Result<(), F
     }
 }
 
-/// Builds the scene, showing progress; leaves `film` bytes free for the picture.
+/// Builds the scene, showing progress; leaves `film` bytes free for the picture. `rays` are expected, or as many
+/// as the scene's settings say.
 pub(super) fn build(
     args: &SceneArgs,
     accel: &AccelArgs,
     loaded: LoadedScene,
     film: u64,
+    rays: Option<u64>,
 ) -> Result<Scene, Failure> {
     let options = BuildOptions {
+        expected_rays: rays,
         kind: accel.kind,
         single_rays: accel.single_rays,
         threads: args.threads.map(usize::from),

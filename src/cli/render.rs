@@ -51,7 +51,7 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     check_memory(frame.size, film)?;
     let views = plan.views(frame.size)?;
 
-    let build = || pool.install(|| build(&args.scene, &args.accel, loaded, film));
+    let build = || pool.install(|| build(&args.scene, &args.accel, loaded, film, plan.rays()));
     let scene = timed(&mut phases.build, build)?;
     let job = plan.job(&frame, start);
     let identity = plan.identity(&scene, hash, &frame);
@@ -137,6 +137,12 @@ impl<'a> Plan<'a> {
         let args = self.args;
         let looks = args.tev.is_some() || args.preview.is_some() || self.checkpoint.is_some();
         args.error.is_some() || args.time.is_some() || args.part.is_some() || looks
+    }
+
+    /// How many rays to expect where the scene's settings do not tell: as many as it takes.
+    fn rays(&self) -> Option<u64> {
+        let goes_on = self.args.error.is_some() || self.args.time.is_some();
+        (goes_on && self.args.scene.samples.is_none()).then_some(u64::MAX)
     }
 
     fn job(&self, frame: &Frame, start: Instant) -> RenderJob {

@@ -20,7 +20,9 @@ use super::requirements::{Contents, Requirements, has_clear_shadows};
 use super::surface::SurfacePoint;
 use super::tessellate::{Tessellation, tessellate};
 use super::volumes::{check_volumes, placed_volumes};
-use crate::accel::{Accel, AccelError, AccelKind, BuildOptions, Hit, MemoryEstimate, World};
+use crate::accel::{
+    Accel, AccelError, AccelKind, BuildOptions, BuildQuality, Hit, MemoryEstimate, World,
+};
 use crate::camera::{Camera, Lens, Pose, Projection};
 use crate::color::Rgb;
 use crate::light::{Light, LightTree};
@@ -68,6 +70,8 @@ pub struct Scene {
     pub accel: Accel,
     /// What it was expected to take.
     pub memory_estimate: MemoryEstimate,
+    /// How much work went into the hierarchy over the world's root: [`BuildQuality::Auto`], decided.
+    pub build_quality: BuildQuality,
     /// Whether it is of the compact form.
     pub is_compact: bool,
     /// Spheres of glass within which a ray needs no query.
@@ -306,7 +310,7 @@ impl NameIndex {
 
 impl Scene {
     /// Checks a description and makes it ready. `options` say how to build; precision and quality are
-    /// taken from the scene's settings. `progress` hears of the build from 0 to 1, perhaps on several
+    /// taken from the scene's settings, and how many rays to expect where that is not given. `progress` hears of the build from 0 to 1, perhaps on several
     /// threads at once, and ends it by returning false.
     ///
     /// # Errors
@@ -441,6 +445,9 @@ impl Scene {
         let mut options = BuildOptions {
             precision: desc.settings.precision,
             quality: desc.settings.build_quality,
+            expected_rays: options
+                .expected_rays
+                .or_else(|| Some(requirements.expected_rays(size, &desc.settings))),
             ..options.clone()
         };
         let memory_estimate =
@@ -463,6 +470,7 @@ impl Scene {
             bounds,
             accel,
             memory_estimate,
+            build_quality: options.quality_of(&world, &world.root),
             is_compact: options.compact,
             hollows: Hollows::default(),
             world,

@@ -65,7 +65,7 @@ impl BvhAccel {
         options: &BuildOptions,
         progress: &(dyn Fn(f64) -> bool + Sync),
     ) -> Result<Self, AccelError> {
-        let bins = match options.quality {
+        let bins = |group| match options.quality_of(world, group) {
             BuildQuality::Low => 8,
             BuildQuality::Auto | BuildQuality::Medium | BuildQuality::High => 32,
         };
@@ -74,7 +74,7 @@ impl BvhAccel {
         let watch = Watch::new(primitives, options.memory_limit, progress);
         watch.check()?;
         let prototypes = world.prototypes.par_iter().map(|group| {
-            let built = GroupTree::build(group, &[], bins, &watch)?;
+            let built = GroupTree::build(group, &[], bins(group), &watch)?;
             watch.hold(built.tree.bytes())?;
             Ok(built)
         });
@@ -90,7 +90,7 @@ impl BvhAccel {
             })
             .filter_map(|(id, prototype)| Copy::new(id, prototype, world, &prototypes))
             .collect();
-        let root = GroupTree::build(&world.root, &copies, bins, &watch)?;
+        let root = GroupTree::build(&world.root, &copies, bins(&world.root), &watch)?;
         watch.hold(root.tree.bytes())?;
         Ok(Self {
             root,

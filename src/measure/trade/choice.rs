@@ -199,9 +199,11 @@ pub fn knobs(scene: &Scene, base: &Choice) -> Vec<Knob> {
     }
     let qualities = [BuildQuality::Low, BuildQuality::Medium]
         .map(|quality| (quality.name().to_owned(), with(&|c| c.settings.build_quality = quality)));
-    let qualities = qualities
-        .into_iter()
-        .filter(|(name, _)| name != "medium" || settings.build_quality != BuildQuality::Auto);
+    // That which `auto` decided on is there.
+    let is_new = |quality: BuildQuality| {
+        settings.build_quality != BuildQuality::Auto || quality != scene.build_quality
+    };
+    let qualities = qualities.into_iter().filter(|(_, c)| is_new(c.settings.build_quality));
     let high = with(&|c| {
         (c.settings.build_quality, c.settings.precision) = (BuildQuality::High, Precision::Fast);
     });
