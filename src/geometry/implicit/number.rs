@@ -63,6 +63,13 @@ pub(super) fn power(x: f64, n: u32) -> f64 {
     result
 }
 
+/// A quotient; not a number where the divisor is 0. f64 would give it the sign of that zero, while all the other
+/// quotients by numbers of an interval that begins or ends at 0 may have the other.
+#[inline]
+fn quotient(x: f64, divisor: f64) -> f64 {
+    if divisor == 0.0 { f64::NAN } else { x / divisor }
+}
+
 impl Number for f64 {
     #[inline]
     fn constant(x: f64) -> Self {
@@ -82,7 +89,7 @@ impl Number for f64 {
     }
     #[inline]
     fn div(self, other: Self) -> Self {
-        self / other
+        quotient(self, other)
     }
     #[inline]
     fn shift(self, k: f64) -> Self {
@@ -94,7 +101,7 @@ impl Number for f64 {
     }
     #[inline]
     fn recip(self) -> Self {
-        1.0 / self
+        quotient(1.0, self)
     }
     #[inline]
     fn neg(self) -> Self {

@@ -248,6 +248,15 @@ fn quotients_of_bounds_without_end_hold_every_value() {
     assert!(value < -3.0 && range.lo <= value && value <= range.hi, "{value} {range:?}");
 }
 
+#[test]
+fn nothing_is_divided_by_zero() {
+    for text in
+        ["x / (y - y)", "x / -(y - y)", "(x - x)^(-1)", "1 / min(0, x)", "x / sqrt(-(y - y))"]
+    {
+        assert!(Expression::parse(text).unwrap().value(DVec3::ONE).is_nan(), "{text}");
+    }
+}
+
 proptest! {
     #![proptest_config(cases(4000))]
 
