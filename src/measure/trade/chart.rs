@@ -11,6 +11,13 @@ const SIZE: [f64; 2] = [900.0, 460.0];
 /// Left, right (with room for names), top, bottom.
 const MARGIN: [f64; 4] = [64.0, 150.0, 12.0, 40.0];
 
+/// Of marks.
+const RADIUS: f64 = 4.5;
+
+/// Width of a letter and height of a line of names, about.
+const LETTER: f64 = 7.0;
+const LINE: f64 = 14.0;
+
 /// Colours of knobs.
 const COLOURS: [&str; 10] = [
     "#2f6cad", "#c4572e", "#3d8a4e", "#8b5fb0", "#a08b1d", "#c2447f", "#2b9b9b", "#7a5a3a",
@@ -198,14 +205,21 @@ impl Chart {
         let mut named: Vec<_> =
             self.marks.iter().filter_map(|mark| Some((mark, mark.name.as_ref()?))).collect();
         named.sort_by(|a, b| b.0.at[1].total_cmp(&a.0.at[1]));
-        // Names keep off each other, and lie under the marks.
-        let mut lowest = f64::NEG_INFINITY;
+        // Names keep off the marks and off each other.
+        let circle = |mark: &Mark| {
+            let [x, y] = [x(mark.at[0]), y(mark.at[1])];
+            [x - RADIUS, y - RADIUS, x + RADIUS, y + RADIUS]
+        };
+        let mut taken: Vec<[f64; 4]> = self.marks.iter().map(circle).collect();
         for (mark, name) in named {
-            lowest = (y(mark.at[1]) + 4.0).max(lowest + 13.0);
+            let (place, is_left) = free_place([x(mark.at[0]), y(mark.at[1])], name, &taken);
+            taken.push(place);
             let _ = writeln!(
                 svg,
-                "<text x=\"{:.1}\" y=\"{lowest:.1}\" class=\"name\" style=\"fill:{}\">{}</text>",
-                x(mark.at[0]) + 9.0,
+                "<text x=\"{:.1}\" y=\"{:.1}\"{} class=\"name\" style=\"fill:{}\">{}</text>",
+                if is_left { place[2] } else { place[0] },
+                place[3] - 3.0,
+                if is_left { " text-anchor=\"end\"" } else { "" },
                 mark.colour,
                 escaped(name)
             );
@@ -214,7 +228,7 @@ impl Chart {
             let ring = if mark.is_ringed { " stroke=\"#1b1f24\" stroke-width=\"2\"" } else { "" };
             let _ = writeln!(
                 svg,
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"4.5\" fill=\"{}\"{ring}><title>{}</title></circle>",
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{RADIUS}\" fill=\"{}\"{ring}><title>{}</title></circle>",
                 x(mark.at[0]),
                 y(mark.at[1]),
                 mark.colour,
@@ -223,6 +237,26 @@ impl Chart {
         }
         svg + "</svg>\n"
     }
+}
+
+/// Where the name of a mark covers least of what is `taken`: its box, and whether it ends at the mark instead of
+/// beginning there. Beside the mark if that is free, else above or below it.
+fn free_place(mark: [f64; 2], name: &str, taken: &[[f64; 4]]) -> ([f64; 4], bool) {
+    let width = LETTER * name.chars().count() as f64;
+    let boxed = |(rise, is_left): (f64, bool)| {
+        let left = if is_left { mark[0] - 2.0 * RADIUS - width } else { mark[0] + 2.0 * RADIUS };
+        let bottom = mark[1] + 7.0 - rise;
+        ([left, bottom - LINE, left + width, bottom], is_left)
+    };
+    let rises = [0.0, -LINE, LINE, -2.0 * LINE, 2.0 * LINE, -3.0 * LINE, 3.0 * LINE];
+    let places = rises.into_iter().flat_map(|rise| [(rise, false), (rise, true)]).map(boxed);
+    let covered = |[x0, y0, x1, y1]: &[f64; 4]| {
+        let overlaps = |t: &&[f64; 4]| *x0 < t[2] && t[0] < *x1 && *y0 < t[3] && t[1] < *y1;
+        let is_outside = *x0 < 0.0 || *y0 < 0.0 || *x1 > SIZE[0] || *y1 > SIZE[1];
+        taken.iter().filter(overlaps).count() + usize::from(is_outside)
+    };
+    // The first of the best.
+    places.min_by_key(|(place, _)| covered(place)).unwrap_or(boxed((0.0, false)))
 }
 
 /// 1, 2 and 5 of each decade between two powers of ten; of many decades the powers alone, of less than one
@@ -244,6 +278,24 @@ fn ticks(low: f64, high: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_cover_neither_marks_nor_names() {
+        let circle = |x: f64, y: f64| [x - RADIUS, y - RADIUS, x + RADIUS, y + RADIUS];
+        let at = [300.0, 200.0];
+        // Beside the mark; to its left, where another stands on the right; below, where one is on either side.
+        let mut taken = vec![circle(at[0], at[1])];
+        assert!(!free_place(at, "name", &taken).1);
+        taken.push(circle(320.0, 201.0));
+        let (left, is_left) = free_place(at, "name", &taken);
+        assert!(is_left && left[2] < at[0], "{left:?}");
+        taken.push(left);
+        let (below, _) = free_place(at, "name", &taken);
+        assert!(below[1] > at[1] + RADIUS, "{below:?}");
+        // Nor does one leave the picture.
+        let (inside, is_left) = free_place([SIZE[0] - 20.0, 100.0], "a long name", &[]);
+        assert!(is_left && inside[2] < SIZE[0]);
+    }
 
     #[test]
     fn ticks_are_round() {
