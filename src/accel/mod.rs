@@ -317,10 +317,10 @@ pub(crate) use with_accel;
 /// Triangles of a mesh from which on it matters how it is built.
 const LARGE: u64 = 1 << 17;
 
-/// So many rays for each triangle take as much longer as [`BuildQuality::Low`] saves: 3 to 10, by the mesh. To
-/// build too well costs more than to build too quickly: up to half as much again, where that is up to a tenth.
+/// So many rays for each triangle take as much longer as [`BuildQuality::Low`] saves: 3 to more than 16, by the mesh.
+/// Between them, to build too well and too quickly cost about as much.
 // Measured by `cargo bench --bench limits`.
-const FEW_RAYS: u64 = 6;
+const FEW_RAYS: u64 = 9;
 
 impl BuildOptions {
     /// The quality that a group of the world is built with: [`BuildQuality::Auto`], decided. Embree takes low
