@@ -98,7 +98,8 @@ pub(super) struct SceneArgs {
     #[arg(long, value_name = "NAME", value_parser = by_name(&Precision::ALL, Precision::name))]
     pub(super) precision: Option<Precision>,
 
-    /// Work put into the hierarchy: `low` is fast to build, `high` (with --precision fast) fast to trace
+    /// Work put into the hierarchy: `low` is fast to build, `high` (with --precision fast) fast to trace, `auto`
+    /// goes by how many rays are expected
     #[arg(long, value_name = "NAME", value_parser = by_name(&BuildQuality::ALL, BuildQuality::name))]
     pub(super) build_quality: Option<BuildQuality>,
 

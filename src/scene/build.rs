@@ -310,8 +310,8 @@ impl NameIndex {
 
 impl Scene {
     /// Checks a description and makes it ready. `options` say how to build; precision and quality are
-    /// taken from the scene's settings, and how many rays to expect where that is not given. `progress` hears of the build from 0 to 1, perhaps on several
-    /// threads at once, and ends it by returning false.
+    /// taken from the scene's settings, and how many rays to expect where that is not given. `progress` hears of
+    /// the build from 0 to 1, perhaps on several threads at once, and ends it by returning false.
     ///
     /// # Errors
     /// Every mistake that was found.

@@ -204,7 +204,7 @@ impl Requirements {
     ///
     /// [`BuildOptions::expected_rays`]: crate::accel::BuildOptions::expected_rays
     pub fn expected_rays(&self, size: [u32; 2], settings: &RenderSettings) -> u64 {
-        // How many come of a camera ray is known when they are traced.
+        // Four rays that count whole; how many it really is, is known when they are traced.
         const OF_A_TREE: u64 = 8;
         let points =
             self.lecture_lights + self.point_lights + self.directional_lights + self.spot_lights;
