@@ -1,5 +1,5 @@
-//! The variants of the ray tree: from the least that a scene requires on, all give the same picture, bit
-//! for bit, and trace the same rays.
+//! The variants of the ray tree: from the least that a scene requires on, all trace the same rays and give the
+//! same picture, but for the order in which the light of a pixel is summed.
 #![allow(missing_docs, reason = "a test program")]
 
 use std::fmt::Write as _;
@@ -91,12 +91,19 @@ fn build(text: &str, kind: AccelKind) -> Scene {
 }
 
 /// All that must not depend on the variant: what ended branches is not counted where there are none.
-fn picture(scene: &Scene, variant: Option<Variant>) -> (Vec<[u32; 3]>, RayCounts, BranchEnds) {
+fn picture(scene: &Scene, variant: Option<Variant>) -> (Vec<[f32; 3]>, RayCounts, BranchEnds) {
     let rendered = render(scene, &RenderJob { variant, ..RenderJob::default() }, &());
     assert_eq!(rendered.non_finite.count, 0);
-    let bits = rendered.film.mean.iter().map(|c| c.to_array().map(f32::to_bits)).collect();
+    let pixels = rendered.film.mean.iter().map(|c| c.to_array()).collect();
     let rays = RayCounts { ends: BranchEnds::default(), ..rendered.rays };
-    (bits, rays, rendered.rays.ends)
+    (pixels, rays, rendered.rays.ends)
+}
+
+/// Whether they differ by no more than sums of up to some hundred numbers do in f32, none of them below 0, by
+/// their order.
+fn are_alike(a: &[[f32; 3]], b: &[[f32; 3]]) -> bool {
+    let values = a.iter().flatten().zip(b.iter().flatten());
+    a.len() == b.len() && values.into_iter().all(|(a, b)| (a - b).abs() <= 1e-5 * a.max(*b))
 }
 
 /// Greater variants than the least do what that does, and nothing more.
@@ -115,7 +122,7 @@ fn check(materials: &[&str], expected: Variant, seed: u64) {
                 let forced = picture(&scene, Some(variant));
                 let name =
                     format!("{} by `{}`, round {round}\n{text}", kind.name(), variant.name());
-                assert!(chosen.0 == forced.0, "another picture with {name}");
+                assert!(are_alike(&chosen.0, &forced.0), "another picture with {name}");
                 assert_eq!(chosen.1, forced.1, "other rays with {name}");
                 if least > Variant::Local {
                     assert_eq!(chosen.2, forced.2, "other ends with {name}");

@@ -108,11 +108,11 @@ impl HitBlock {
     /// Asks `hit` for each lane in `active`.
     #[inline]
     pub fn from_fn(active: u16, mut hit: impl FnMut(usize) -> Option<Hit>) -> Self {
-        let mut hits = [None; LANES];
-        for lane in lanes_of(active) {
-            hits[lane] = hit(lane);
+        Self {
+            hits: std::array::from_fn(
+                |lane| if active >> lane & 1 == 1 { hit(lane) } else { None },
+            ),
         }
-        Self { hits }
     }
 
     /// Sets the hit of a lane.

@@ -102,14 +102,36 @@ impl Sphere {
     /// The unit normal at the point of the surface nearest to `p`.
     #[inline]
     pub fn normal_at(&self, p: DVec3) -> DVec3 {
-        let m = (p - self.center) * (1.0 / self.radius);
-        // Nearly always `p` is close to the surface: three terms of the series of 1/√(1 + off) then
-        // have an error of 5/16·off³, below 10⁻¹⁵.
-        let off = m.length_squared() - 1.0;
-        if off.abs() < 1e-5 {
-            return m * (1.0 - off * (0.5 - 0.375 * off));
+        let (normal, is_close) = self.normal_close_to(p);
+        if is_close {
+            return normal;
         }
-        m.normalize_or(DVec3::Y)
+        ((p - self.center) * (1.0 / self.radius)).normalize_or(DVec3::Y)
+    }
+
+    /// Where a ray from within comes out, at t > 0, to the last bit as [`AnalyticShape::intersect`] finds it; and
+    /// whether it is from within. Without branches.
+    #[inline(always)]
+    pub(crate) fn far_side(&self, origin: DVec3, direction: DVec3) -> (f64, bool) {
+        let l = self.center - origin;
+        let d2 = direction.length_squared();
+        let r2 = self.radius * self.radius;
+        let disc = r2 * d2 - l.cross(direction).length_squared();
+        let b = l.dot(direction);
+        let c = l.length_squared() - r2;
+        let q = b + disc.sqrt().copysign(b);
+        // One root is behind, the other ahead.
+        let t = if b > 0.0 { q / d2 } else { c / q };
+        (t, (c < 0.0) & (disc >= 0.0) & (t > 0.0))
+    }
+
+    /// [`Sphere::normal_at`] without a root, and whether `p` is so close to the surface that it is right.
+    #[inline(always)]
+    pub(crate) fn normal_close_to(&self, p: DVec3) -> (DVec3, bool) {
+        let m = (p - self.center) * (1.0 / self.radius);
+        // Three terms of the series of 1/√(1 + off) have an error of 5/16·off³, below 10⁻¹⁵.
+        let off = m.length_squared() - 1.0;
+        (m * (1.0 - off * (0.5 - 0.375 * off)), off.abs() < 1e-5)
     }
 }
 
@@ -169,6 +191,31 @@ mod tests {
     }
 
     proptest! {
+        /// What a query finds, to the last bit; and only outside, or within rounding of the surface, is it said
+        /// not to be from within.
+        #[test]
+        fn rays_from_within_come_out_where_queries_say(
+            from in prop::array::uniform3(-1.1f64..1.1),
+            to in prop::array::uniform3(-1f64..1.0),
+            log_radius in -6f64..6.0,
+            is_at_surface in prop::bool::ANY,
+        ) {
+            let (from, to) = (DVec3::from(from), DVec3::from(to));
+            prop_assume!(from.length() > 0.01 && to.length() > 0.01);
+            let radius = 10f64.powf(log_radius);
+            let s = Sphere { center: DVec3::new(3.0, -2.0, 7.0) * radius, radius };
+            // As rays start that are refracted into it, or anywhere.
+            let from = if is_at_surface { from.normalize() * (1.0 - 1e-6) } else { from };
+            let (origin, direction) = (s.center + from * radius, to.normalize());
+            let (t, is_within) = s.far_side(origin, direction);
+            if is_within {
+                let found = s.intersect(origin, direction, 0.0, f64::INFINITY);
+                prop_assert_eq!(found.map(|hit| hit.t), Some(t));
+            } else {
+                prop_assert!(from.length() > 1.0 - 1e-13);
+            }
+        }
+
         /// The hit point, computed along the ray from nearby, is on the surface; and rays through the
         /// interior never miss, at any distance. The oracle is |o + t d − c| = r in f64, for which
         /// the ray is first moved towards the sphere.

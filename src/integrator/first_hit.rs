@@ -31,7 +31,7 @@ impl FirstHits {
                 found.albedo[lane] = points.material(scene, lane).albedo();
                 found.shading_normal[lane] = vector(&points.normal, lane);
             } else if let Some(hit) = camera.hits.get(lane) {
-                let mut point = points.point(scene, lane);
+                let mut point = points.point(scene, hit, lane);
                 let cone = Cone::of_pixel(scene, &camera.rays.get(lane));
                 let cone = scene.widened(cone, hit, point.position);
                 let textured = scene.apply_maps(hit, cone.width, &mut point);

@@ -21,14 +21,19 @@ pub(super) fn scaled(color: Rgb, k: f64) -> Rgb {
 /// there is no direction.
 #[inline]
 pub(super) fn aim(p: DVec3, target: DVec3, short: f64, irradiance: Rgb) -> Option<LightSample> {
+    let (sample, is_any) = aimed(p, target, short, irradiance);
+    is_any.then_some(sample)
+}
+
+/// As [`aim`], without a branch; and whether there is any.
+#[inline(always)]
+pub(super) fn aimed(p: DVec3, target: DVec3, short: f64, irradiance: Rgb) -> (LightSample, bool) {
     let to_target = target - p;
     let length = to_target.length();
     let distance = (length - short).min(f64::from(f32::MAX)) as f32;
+    let direction = (to_target * (1.0 / length)).as_vec3();
     // Also refuses NaN.
-    if !(distance > 0.0) {
-        return None;
-    }
-    Some(LightSample { direction: (to_target * (1.0 / length)).as_vec3(), distance, irradiance })
+    (LightSample { direction, distance, irradiance }, distance > 0.0)
 }
 
 /// How far off a light's surface a shadow ray must end, so that the surface does not block it.

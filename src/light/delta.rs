@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::LightSample;
-use super::aim::{aim, scaled};
+use super::aim::{aim, aimed, scaled};
 use super::bounds::{Cone, LightBounds, strength};
 use crate::color::Rgb;
 use crate::math::Bounds;
@@ -61,11 +61,18 @@ pub struct DirectionalLight {
 impl PointLight {
     #[inline]
     pub(super) fn sample(&self, p: DVec3) -> Option<LightSample> {
-        let irradiance = match self.falloff {
-            Falloff::InverseSquare => inverse_square(self.intensity, p, self.position)?,
-            Falloff::None => scaled(self.intensity, std::f64::consts::PI),
+        let (sample, is_any) = self.sample_always(p);
+        is_any.then_some(sample)
+    }
+
+    /// What arrives at `p`, found without a branch; and whether any does.
+    #[inline(always)]
+    pub(crate) fn sample_always(&self, p: DVec3) -> (LightSample, bool) {
+        let k = match self.falloff {
+            Falloff::InverseSquare => 1.0 / p.distance_squared(self.position),
+            Falloff::None => std::f64::consts::PI,
         };
-        aim(p, self.position, 0.0, irradiance)
+        aimed(p, self.position, 0.0, scaled(self.intensity, k))
     }
 
     pub(super) fn bounds(&self) -> Option<LightBounds> {

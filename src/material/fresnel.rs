@@ -43,35 +43,51 @@ pub struct Refraction {
 /// grazing angles nor with eta near 1, where 1 − sin²θt loses its digits.
 #[inline]
 pub fn refract(d: Vec3, n: Vec3, eta: f32) -> Option<Refraction> {
-    let (d, mut n) = (normalized(d.as_dvec3()), normalized(n.as_dvec3()));
-    let mut cos_i = -d.dot(n);
-    if cos_i < 0.0 {
-        (cos_i, n) = (-cos_i, -n);
-    }
-    let cos_i = cos_i.clamp(0.0, 1.0);
+    let (d, n) = (normalized(d.as_dvec3()), normalized(n.as_dvec3()));
+    let (refraction, is_any) = refracted(d, n, eta);
+    is_any.then_some(refraction)
+}
+
+/// As [`refract`], without branches: whether there is any comes second, and third whether it is right, as it is
+/// for vectors of unit length up to the rounding of f32.
+#[inline(always)]
+pub fn refract_always(d: Vec3, n: Vec3, eta: f32) -> (Refraction, bool, bool) {
+    let ((d, d_is_unit), (n, n_is_unit)) =
+        (nearly_normalized(d.as_dvec3()), nearly_normalized(n.as_dvec3()));
+    let (refraction, is_any) = refracted(d, n, eta);
+    (refraction, is_any, d_is_unit & n_is_unit)
+}
+
+/// Both at unit length.
+#[inline(always)]
+fn refracted(d: DVec3, n: DVec3, eta: f32) -> (Refraction, bool) {
+    let cos_i = -d.dot(n);
+    let n = if cos_i < 0.0 { -n } else { n };
+    let cos_i = cos_i.abs();
+    let cos_i = if cos_i > 1.0 { 1.0 } else { cos_i };
     let e = f64::from(eta);
     let under_root = cos_i * cos_i + (e - 1.0) * (e + 1.0);
-    // Also refuses NaN: the direction or the normal was zero.
-    if !(under_root >= 0.0) {
-        return None;
-    }
     let per_e = 1.0 / e;
     let cos_t = (under_root.sqrt() * per_e).min(1.0);
     let direction = (d + n * cos_i) * per_e - n * cos_t;
-    Some(Refraction {
-        direction: direction.as_vec3(),
-        cos_i: cos_i as f32,
-        cos_t: cos_t as f32,
-        eta,
-    })
+    let (cos_i, cos_t) = (cos_i as f32, cos_t as f32);
+    // Also refuses NaN: the direction or the normal was zero.
+    (Refraction { direction: direction.as_vec3(), cos_i, cos_t, eta }, under_root >= 0.0)
 }
 
 /// The direction of a vector. What is of unit length up to the rounding of f32 takes neither root nor
 /// division: three terms of the series of 1/√(1 + off) have an error of 5/16·off³, below 10⁻¹⁸.
 #[inline]
 fn normalized(v: DVec3) -> DVec3 {
+    let (unit, is_close) = nearly_normalized(v);
+    if is_close { unit } else { v / v.length() }
+}
+
+/// As [`normalized`], and whether the vector was so close to unit length that it is right.
+#[inline(always)]
+fn nearly_normalized(v: DVec3) -> (DVec3, bool) {
     let off = v.length_squared() - 1.0;
-    if off.abs() < 1e-6 { v * (1.0 - off * (0.5 - 0.375 * off)) } else { v / v.length() }
+    (v * (1.0 - off * (0.5 - 0.375 * off)), off.abs() < 1e-6)
 }
 
 impl Refraction {
@@ -100,7 +116,7 @@ pub fn schlick_dielectric(cos_i: f32, cos_t: f32, eta: f32) -> f32 {
 /// no `cos_t`; it is 1.
 ///
 /// `cos_i`, `cos_t`: cosines of the angles of incidence and refraction, as [`refract`] gives them.
-#[inline]
+#[inline(always)]
 pub fn dielectric(cos_i: f32, cos_t: f32, eta: f32) -> f32 {
     let [s, p] = dielectric_polarized(cos_i, cos_t, eta);
     0.5 * (s + p)
@@ -112,19 +128,17 @@ pub fn dielectric(cos_i: f32, cos_t: f32, eta: f32) -> f32 {
 /// angle: s is (cos θi − eta·cos θt)/(cos θi + eta·cos θt) with the difference multiplied out by Snell's law,
 /// p is s times cos(θi + θt)/cos(θi − θt).
 /// Source: Born & Wolf, *Principles of Optics*, 7th ed., §1.5.2, (21) and (21a).
-#[inline]
+#[inline(always)]
 pub fn dielectric_polarized(cos_i: f32, cos_t: f32, eta: f32) -> [f32; 2] {
     let step = (eta - 1.0) * (eta + 1.0);
-    if step == 0.0 {
-        return [0.0; 2]; // No surface. At 90° the quotients would be 0/0.
-    }
     let sum = cos_i + eta * cos_t;
     let s = step / (sum * sum);
     let (cosines, sines) = (cos_i * cos_t, (1.0 - cos_i) * (1.0 + cos_i) / eta);
     // Straight on without a cos_t there is no angle to speak of.
     let turn = if cosines + sines > 0.0 { (cosines - sines) / (cosines + sines) } else { 1.0 };
     let p = s * turn;
-    [(s * s).min(1.0), (p * p).min(1.0)]
+    // Without a step there is no surface. At 90° the quotients would be 0/0.
+    if step == 0.0 { [0.0; 2] } else { [(s * s).min(1.0), (p * p).min(1.0)] }
 }
 
 /// Fresnel's reflectance of a metal for unpolarised light, in [0, 1] per channel.
@@ -287,6 +301,21 @@ mod tests {
             prop_assert!((t - nu * t.dot(nu)).dot(du) > -1e-7);
             if eta == 1.0 {
                 prop_assert!((t - du).length() < 1.5e-7);
+            }
+        }
+
+        /// To the last bit, wherever it says so: for all that is of unit length up to rounding.
+        #[test]
+        fn refraction_is_the_same_without_branches(
+            (d, n) in meeting(),
+            eta in index(),
+            is_unit in prop::bool::ANY,
+        ) {
+            let (d, n) = if is_unit { (d.normalize(), n.normalize()) } else { (d, n) };
+            let (always, is_any, is_right) = refract_always(d, n, eta);
+            prop_assert!(is_right || !is_unit);
+            if is_right {
+                prop_assert_eq!(is_any.then_some(always), refract(d, n, eta));
             }
         }
 

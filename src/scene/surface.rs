@@ -67,12 +67,8 @@ impl Scene {
     #[inline(always)]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint<'_> {
         // The short way: no transform, and a normal that always is there.
-        if hit.copy.is_none()
-            && let Geometry::Shapes(Shapes::Spheres(spheres)) =
-                &self.world.root.geometries[hit.geometry as usize]
-        {
+        if let Some((sphere, id)) = self.sphere(hit) {
             let material_index = self.look(hit).material;
-            let sphere = &spheres[hit.primitive as usize];
             let local = on_shape(sphere, ray, hit, None);
             let is_front = local.normal.dot(ray.direction) <= 0.0;
             let normal = if is_front { local.normal } else { -local.normal };
@@ -84,13 +80,22 @@ impl Scene {
                 is_front,
                 material: &self.materials[material_index as usize],
                 material_index,
-                sphere: Some((
-                    sphere,
-                    SphereId { geometry: hit.geometry, primitive: hit.primitive },
-                )),
+                sphere: Some((sphere, id)),
             };
         }
         self.surface_of_any(ray, hit)
+    }
+
+    /// The sphere that was hit, where it is one and no copy.
+    #[inline(always)]
+    pub(super) fn sphere(&self, hit: &Hit) -> Option<(&Sphere, SphereId)> {
+        let &Hit { geometry, primitive, .. } = hit;
+        match &self.world.root.geometries[geometry as usize] {
+            Geometry::Shapes(Shapes::Spheres(spheres)) if hit.copy.is_none() => {
+                Some((&spheres[primitive as usize], SphereId { geometry, primitive }))
+            }
+            _ => None,
+        }
     }
 
     /// The point of a surface of any kind, copies included.
@@ -151,12 +156,18 @@ impl Scene {
             let (o, d) = (ray.origin.as_dvec3(), direction.as_dvec3());
             // By the arithmetic that queries use.
             if let Some(far) = sphere.intersect(o, d, ray.t_min.into(), f64::INFINITY) {
-                ray.t_max = (far.t as f32).next_up();
+                ray.t_max = as_far_as(far.t);
                 return (ray, self.hollows.holds(id).then_some(FarSide(id)));
             }
         }
         (ray, None)
     }
+}
+
+/// The end of a ray that is to hit something at `t` there.
+#[inline(always)]
+pub(super) fn as_far_as(t: f64) -> f32 {
+    (t as f32).next_up()
 }
 
 /// The ray that leaves the point `p` of a surface with the geometric normal `n`: see [`Scene::spawn`].
@@ -226,14 +237,27 @@ fn on_shape(
     transform: Option<&Transform3x4>,
 ) -> Local {
     let point = shape.surface_at(point_along(ray, hit.t, transform), hit.part());
-    let position = point.position.as_vec3();
     let normal = shape.shading_normal(point.position, hit.part()).unwrap_or(point.normal);
+    rounded(point.position, point.normal, normal)
+}
+
+/// A point that was found in f64.
+#[inline(always)]
+fn rounded(position: DVec3, geometric_normal: DVec3, normal: DVec3) -> Local {
+    let position = position.as_vec3();
     Local {
         position,
         error: gamma(2) * position.abs().max_element(),
-        geometric_normal: point.normal.as_vec3(),
+        geometric_normal: geometric_normal.as_vec3(),
         normal: normal.as_vec3(),
     }
+}
+
+/// As [`on_shape`], of a sphere, without branches; and whether the ray came close enough to it for that.
+#[inline(always)]
+pub(super) fn on_sphere(sphere: &Sphere, ray: &Ray, t: f32) -> (Local, bool) {
+    let (normal, is_close) = sphere.normal_close_to(point_along(ray, t, None));
+    (rounded(sphere.center + normal * sphere.radius, normal, normal), is_close)
 }
 
 /// The point at distance `t` of a ray, in the space of its copy, in f64.

@@ -3,14 +3,19 @@
 
 #![expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::build::Scene;
-use super::surface::{Local, SurfacePoint, facing, on_triangle, smooth_normal, spawn, to_world};
-use crate::accel::{Geometry, HitBlock, LANES, RayBlock, lanes_of};
-use crate::geometry::TriangleMesh;
+use super::hollow::{FarSide, SphereId};
+use super::media::Crossing;
+use super::surface::{
+    Local, SurfacePoint, as_far_as, facing, on_sphere, on_triangle, smooth_normal, spawn, to_world,
+};
+use crate::accel::{Geometry, Hit, HitBlock, LANES, RayBlock, lanes_of, lanes_where};
+use crate::geometry::{Sphere, TriangleMesh};
 use crate::material::Material;
 use crate::math::Vec3Lanes;
+use crate::medium::Interior;
 
 /// Points on surfaces, by lane; see [`SurfacePoint`].
 #[derive(Debug, Clone)]
@@ -26,6 +31,7 @@ pub struct SurfaceBlock {
     is_front: [bool; LANES],
     material: [u32; LANES],
     hit: u16,
+    spheres: Spheres,
 }
 
 impl SurfaceBlock {
@@ -41,9 +47,15 @@ impl SurfaceBlock {
         &scene.materials[self.material[lane] as usize]
     }
 
-    /// One point by itself.
+    /// The passage of a ray of a lane that is inside of `interior` through its surface.
     #[inline]
-    pub fn point<'s>(&self, scene: &'s Scene, lane: usize) -> SurfacePoint<'s> {
+    pub fn crossing(&self, scene: &Scene, interior: Interior, lane: usize) -> Crossing {
+        scene.crossing(interior, self.material[lane], self.is_front[lane])
+    }
+
+    /// The point of the `hit` of a lane by itself.
+    #[inline]
+    pub fn point<'s>(&self, scene: &'s Scene, hit: &Hit, lane: usize) -> SurfacePoint<'s> {
         SurfacePoint {
             position: self.position.get(lane),
             error: self.error[lane],
@@ -52,7 +64,7 @@ impl SurfaceBlock {
             is_front: self.is_front[lane],
             material: self.material(scene, lane),
             material_index: self.material[lane],
-            sphere: None,
+            sphere: scene.sphere(hit),
         }
     }
 
@@ -77,6 +89,7 @@ impl Scene {
             is_front: [false; LANES],
             material: [0; LANES],
             hit: 0,
+            spheres: Spheres::NONE,
         };
         // Triangles are gathered, first their indices and then their corners, so that memory is asked for
         // all that it takes a while to bring at once; what else there is follows one by one.
@@ -84,15 +97,23 @@ impl Scene {
         let mut corners = [Vec3Lanes::<LANES>::ZERO; 3];
         let (mut u, mut v) = ([0.0; LANES], [0.0; LANES]);
         let mut smooth = Vec3Lanes::<LANES>::ZERO;
-        let (mut is_smooth, mut others, mut copies) = ([false; LANES], 0u16, 0u16);
+        let mut is_smooth = [false; LANES];
+        let (mut triangles, mut others, mut copies) = (0u16, 0u16, 0u16);
         for lane in rays.lanes() {
             let Some(hit) = hits.get(lane) else { continue };
             block.hit |= 1 << lane;
             let geometry = &self.world.group(hit.copy).geometries[hit.geometry as usize];
             let Geometry::Mesh(mesh) = geometry else {
-                others |= 1 << lane;
+                match self.sphere(hit) {
+                    Some((sphere, _)) => {
+                        block.material[lane] = self.look(hit).material;
+                        block.spheres.set(lane, sphere, hit.t);
+                    }
+                    None => others |= 1 << lane,
+                }
                 continue;
             };
+            triangles |= 1 << lane;
             block.material[lane] = self.look(hit).material;
             copies |= u16::from(hit.copy.is_some()) << lane;
             faces[lane] = Some((mesh, mesh.triangles[hit.primitive as usize]));
@@ -103,14 +124,14 @@ impl Scene {
             }
         }
 
-        for lane in lanes_of(block.hit & !others) {
+        for lane in lanes_of(triangles) {
             let Some((mesh, face)) = faces[lane] else { continue };
             for (corners, vertex) in corners.iter_mut().zip(face) {
                 corners.set(lane, mesh.positions.get(vertex as usize));
             }
         }
 
-        if others != block.hit {
+        if triangles != 0 {
             let SurfaceBlock { position, error, geometric_normal, .. } = &mut block;
             on_triangles(&corners, &u, &v, position, error, geometric_normal);
             block.normal = block.geometric_normal;
@@ -130,6 +151,12 @@ impl Scene {
                     block.normal.set(lane, placed.normal);
                 }
             }
+        }
+        let spheres = block.spheres.lanes;
+        if spheres != 0 {
+            others |= spheres & !on_spheres(rays, &mut block);
+        }
+        if triangles | spheres != 0 {
             let SurfaceBlock { geometric_normal, normal, is_front, .. } = &mut block;
             face(rays, geometric_normal, normal, is_front);
         }
@@ -163,6 +190,64 @@ impl Scene {
         rays.activate(lanes);
         rays
     }
+
+    /// The rays that leave the `hits` of `lanes` into `directions` (unit length) for whatever comes, and what they
+    /// are known to come to; see [`Scene::spawn_on`].
+    pub fn spawn_block_on(
+        &self,
+        points: &SurfaceBlock,
+        hits: &HitBlock,
+        directions: &Vec3Lanes<LANES>,
+        lanes: u16,
+    ) -> (RayBlock, [Option<FarSide>; LANES]) {
+        let mut rays = self.spawn_block(points, directions, &[f32::INFINITY; LANES], lanes);
+        let mut known = [None; LANES];
+        let within = points.spheres.lanes & lanes & inward(points, directions);
+        if within == 0 {
+            return (rays, known);
+        }
+        let (far, is_right) = far_sides(&points.spheres, &rays);
+        for lane in lanes_of(within) {
+            let Some(hit) = hits.get(lane) else { continue };
+            if is_right[lane] {
+                rays.t_max[lane] = as_far_as(far[lane]);
+                let &Hit { geometry, primitive, .. } = hit;
+                let id = SphereId { geometry, primitive };
+                known[lane] = self.hollows.holds(id).then_some(FarSide(id));
+            } else {
+                let ray;
+                (ray, known[lane]) =
+                    self.spawn_on(&points.point(self, hit, lane), directions.get(lane));
+                rays.set(lane, &ray);
+            }
+        }
+        (rays, known)
+    }
+}
+
+/// The lanes whose direction is into what they hit.
+#[inline(never)]
+fn inward(points: &SurfaceBlock, directions: &Vec3Lanes<LANES>) -> u16 {
+    let mut is_inward = [false; LANES];
+    for i in 0..LANES {
+        let is_beyond = directions.get(i).dot(points.geometric_normal.get(i)) < 0.0;
+        is_inward[i] = is_beyond == points.is_front[i];
+    }
+    lanes_where(&is_inward)
+}
+
+/// Where rays within spheres come out, and whether they are within.
+#[inline(never)]
+fn far_sides(spheres: &Spheres, rays: &RayBlock) -> ([f64; LANES], [bool; LANES]) {
+    let (mut far, mut is_right) = ([0.0; LANES], [false; LANES]);
+    for i in 0..LANES {
+        let ray = rays.get(i);
+        let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let (t, is_within) = spheres.get(i).far_side(o, d);
+        far[i] = t;
+        is_right[i] = is_within & (t > f64::from(ray.t_min));
+    }
+    (far, is_right)
 }
 
 /// Position, error and normal of points on triangles.
@@ -183,6 +268,60 @@ fn on_triangles(
         error[i] = local.error;
         normal.set(i, local.geometric_normal);
     }
+}
+
+/// The spheres that lanes hit, but for copies, and where along their rays.
+#[derive(Debug, Clone)]
+struct Spheres {
+    center: [[f64; LANES]; 3],
+    radius: [f64; LANES],
+    t: [f32; LANES],
+    is_sphere: [bool; LANES],
+    lanes: u16,
+}
+
+impl Spheres {
+    const NONE: Self = Self {
+        center: [[0.0; LANES]; 3],
+        radius: [1.0; LANES],
+        t: [0.0; LANES],
+        is_sphere: [false; LANES],
+        lanes: 0,
+    };
+
+    #[inline(always)]
+    const fn get(&self, lane: usize) -> Sphere {
+        let [x, y, z] = &self.center;
+        Sphere { center: DVec3::new(x[lane], y[lane], z[lane]), radius: self.radius[lane] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, sphere: &Sphere, t: f32) {
+        for (axis, c) in sphere.center.to_array().into_iter().enumerate() {
+            self.center[axis][lane] = c;
+        }
+        (self.radius[lane], self.t[lane], self.is_sphere[lane]) = (sphere.radius, t, true);
+        self.lanes |= 1 << lane;
+    }
+}
+
+/// Position, error and normal of points on spheres; of the other lanes nothing is changed. Returns the lanes
+/// that came close enough to theirs for it to be right.
+#[inline(never)]
+fn on_spheres(rays: &RayBlock, block: &mut SurfaceBlock) -> u16 {
+    let mut is_right = [false; LANES];
+    let SurfaceBlock { position, error, geometric_normal, normal, spheres, .. } = block;
+    for i in 0..LANES {
+        let (local, is_close) = on_sphere(&spheres.get(i), &rays.get(i), spheres.t[i]);
+        let is_sphere = spheres.is_sphere[i];
+        let chosen = |new: Vec3, old: Vec3| if is_sphere { new } else { old };
+        position.set(i, chosen(local.position, position.get(i)));
+        error[i] = if is_sphere { local.error } else { error[i] };
+        geometric_normal.set(i, chosen(local.geometric_normal, geometric_normal.get(i)));
+        normal.set(i, chosen(local.normal, normal.get(i)));
+        is_right[i] = is_close;
+    }
+    lanes_where(&is_right)
 }
 
 /// Turns the normals to the side that the rays come from.
@@ -211,5 +350,117 @@ impl SurfaceBlock {
             geometric_normal: self.geometric_normal.get(lane),
             normal: self.normal.get(lane),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::AccelKind;
+    use crate::geometry::TriangleMesh;
+    use crate::material::{Dielectric, FresnelModel, Ior};
+    use crate::math::{Bounds, Ray};
+    use crate::scene::{
+        Location, MaterialDesc, ObjectDesc, PrototypeDesc, Reference, SceneDesc, ShapeDesc,
+    };
+    use glam::DAffine3;
+
+    /// Numbers in [−1, 1).
+    fn numbers(mut state: u32) -> impl FnMut() -> f64 {
+        move || {
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+        }
+    }
+
+    /// Glass balls, of which some overlap, flat and smooth triangles, boxes, and copies.
+    fn scene(kind: AccelKind) -> Scene {
+        let mut next = numbers(11);
+        let mut point = || DVec3::new(next(), next(), next());
+        let glass = Dielectric {
+            ior: Ior::Constant(1.5),
+            absorption: crate::color::Rgb::BLACK,
+            priority: 0,
+            fresnel: FresnelModel::Exact,
+        };
+        let glass = MaterialDesc::new("glass".to_owned(), Material::Dielectric(glass));
+        let mut desc = SceneDesc { materials: vec![glass], ..SceneDesc::default() };
+        let object = |shape| ObjectDesc::new(shape, Some("glass"));
+        for _ in 0..40 {
+            desc.objects.push(object(ShapeDesc::Sphere { center: point(), radius: 0.15 }));
+        }
+        // The rest to one side, so that some of the balls are hollow.
+        let mut point = || point() * 0.5 + DVec3::X * 0.6;
+        for is_smooth in [false, true] {
+            let corners: Vec<f32> = (0..40).flat_map(|_| point().as_vec3().to_array()).collect();
+            let triangles = (0..38).map(|i| [i, i + 1, i + 2]).collect();
+            let mut mesh = TriangleMesh::new(corners, triangles);
+            mesh.normals = is_smooth.then(|| {
+                let normals: Vec<_> = (0..40).map(|_| point().as_vec3().to_array()).collect();
+                normals.into()
+            });
+            let index = desc.meshes.len();
+            desc.meshes.push(mesh);
+            desc.objects.push(object(ShapeDesc::Mesh(index)));
+        }
+        let corner = point();
+        let bounds = Bounds { min: corner, max: corner + 0.3 };
+        desc.objects.push(object(ShapeDesc::Box(bounds)));
+        let ball = ShapeDesc::Sphere { center: DVec3::ZERO, radius: 0.2 };
+        desc.prototypes.push(PrototypeDesc {
+            at: Location::default(),
+            name: "copy".to_owned(),
+            objects: vec![object(ball), object(ShapeDesc::Mesh(0))],
+        });
+        let copy = |at: DVec3| {
+            let squeeze = DAffine3::from_scale(DVec3::new(0.3, -0.4, 0.5));
+            DAffine3::from_translation(at) * squeeze
+        };
+        let transforms = (0..10).map(|_| copy(point())).collect();
+        let copies = ShapeDesc::Instances { prototype: Reference::new("copy"), transforms };
+        desc.objects.push(ObjectDesc::new(copies, None));
+        Scene::build_quietly(desc, kind).unwrap()
+    }
+
+    /// Side by side all is as it is one by one, to the last bit: points, and the rays that leave them.
+    #[test]
+    fn blocks_are_as_their_lanes() {
+        let scene = scene(AccelKind::default());
+        let mut next = numbers(12);
+        let mut unit = || DVec3::new(next(), next(), next()).normalize_or(DVec3::X).as_vec3();
+        let (mut on_spheres, mut on_others, mut known, mut bounded) = (0, 0, 0, 0);
+        for round in 0..3000 {
+            // From without, where all rays hit much the same, from within, and from afar.
+            let eye = unit() * [1.5, 0.5, 1e5][round % 3];
+            let mut rays = RayBlock::empty();
+            for lane in (0..LANES).filter(|lane| (round >> 2) % 5 != lane % 5) {
+                let aim = unit() * if round % 2 == 0 { 0.9 } else { 0.1 };
+                let direction = (aim - eye).normalize();
+                rays.set(lane, &Ray::new(eye, direction));
+            }
+            let query = scene.accel.query();
+            let hits = HitBlock::from_fn(rays.active(), |lane| query.intersect(&rays.get(lane)));
+            let block = scene.surfaces(&rays, &hits);
+            let mut directions = Vec3Lanes::ZERO;
+            (0..LANES).for_each(|lane| directions.set(lane, unit()));
+            let (next, sides) = scene.spawn_block_on(&block, &hits, &directions, block.hit());
+            for lane in rays.lanes() {
+                let Some(hit) = hits.get(lane) else {
+                    assert_eq!(block.hit() >> lane & 1, 0);
+                    continue;
+                };
+                let expected = scene.surface(&rays.get(lane), hit);
+                let point = block.point(&scene, hit, lane);
+                assert_eq!(format!("{point:?}"), format!("{expected:?}"));
+                let (ray, side) = scene.spawn_on(&expected, directions.get(lane));
+                assert_eq!((next.get(lane), sides[lane]), (ray, side));
+                on_spheres += usize::from(point.sphere.is_some());
+                on_others += usize::from(point.sphere.is_none());
+                known += usize::from(side.is_some());
+                bounded += usize::from(ray.t_max < 1e3 && side.is_none());
+            }
+        }
+        let counts = [on_spheres, on_others, known, bounded];
+        assert!(counts.iter().all(|&n| n > 500), "{counts:?}");
     }
 }

@@ -5,14 +5,16 @@
 //!
 //! The tree is walked with a stack of its own, so no depth overflows the thread's. First hits are
 //! shaded as a block: their shadow rays towards one light run close together and are traced in packets.
-//! So are the rays that a block sends off a flat mirror or through a flat pane; rays off curved surfaces
-//! spread, and are traced one by one, depth first.
+//! So are the rays that a block sends off a flat mirror or through a flat pane. Where it is known what rays
+//! come to, they stay a block as well. Other rays off curved surfaces spread, and are traced one by one, depth
+//! first: put into blocks of any that wait, they were shaded sooner, but queries took as much longer.
 //!
 //! It is compiled three times ([`Features`]), so that a scene without mirrors, or with nothing but
 //! mirrors, glass and lamps, runs code that knows of nothing else.
 
+mod direct;
+mod fork;
 mod light;
-mod local;
 mod scatter;
 mod shadow;
 mod volume;
@@ -20,14 +22,15 @@ mod volume;
 use std::marker::PhantomData;
 
 use super::{CameraBlock, Integrator, RayCounts};
-use crate::accel::{Hit, HitBlock, LANES, RayQuery};
+use crate::accel::{Hit, HitBlock, LANES, RayBlock, RayQuery};
 use crate::color::Rgb;
 use crate::material::Material;
 use crate::math::Ray;
 use crate::medium::{Interior, beer_lambert};
 use crate::sampler::Sampler;
 use crate::scene::{Cone, FarSide, Scene, SurfacePoint};
-use scatter::Way;
+use direct::direct_light;
+use scatter::{MIN_PACKET, Way};
 
 /// What a compiled variant knows of.
 pub trait Features: Send + Sync + 'static {
@@ -166,8 +169,8 @@ struct Node {
 struct Block {
     /// By lane.
     nodes: [Node; LANES],
+    rays: RayBlock,
     hits: HitBlock,
-    active: u16,
 }
 
 /// The surfaces that up to `N` rays hit, by lane.
@@ -244,7 +247,7 @@ impl<F: Features> Whitted<F> {
         direct: Option<&mut [Rgb; LANES]>,
     ) -> [Rgb; LANES] {
         if !F::TREE {
-            let radiance = local::shade(scene, query, camera, counts);
+            let radiance = local(scene, query, camera, counts);
             if let Some(direct) = direct {
                 *direct = radiance;
             }
@@ -281,7 +284,7 @@ impl<F: Features> Whitted<F> {
         if F::EVERYTHING && scene.fog.is_some() {
             walk.before_the_scene(&mut nodes);
         }
-        walk.shade(camera.rays.active(), &nodes, |lane| camera.hits.get(lane));
+        walk.shade_block(camera.rays, camera.hits, &nodes);
         for lane in (0..LANES).filter(|lane| camera.rays.active() >> lane & 1 == 0) {
             walk.radiance[lane] = scene.background;
         }
@@ -305,8 +308,44 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
                 };
                 self.shade(1, std::array::from_ref(&node), |_| hit.as_ref());
             }
-            let Some(block) = self.blocks.pop() else { return };
-            self.shade(block.active, &block.nodes, |lane| block.hits.get(lane));
+            let Some(Block { nodes, rays, hits }) = self.blocks.pop() else { return };
+            self.shade_block(&rays, &hits, &nodes);
+        }
+    }
+
+    /// As [`Walk::shade`], of a block of rays that run close together.
+    fn shade_block(&mut self, rays: &RayBlock, hits: &HitBlock, nodes: &[Node; LANES]) {
+        if F::EVERYTHING {
+            self.shade(rays.active(), nodes, |lane| hits.get(lane));
+            return;
+        }
+        let scene = self.scene;
+        let points = scene.surfaces(rays, hits);
+        let (query, is_clear) = (self.query, scene.requirements.clear_shadows);
+        let blocked = |rays: &RayBlock| match is_clear {
+            true => query.occluded_by_opaque_block(rays),
+            false => query.occluded_block(rays),
+        };
+        let light = direct_light(scene, rays, &points, self.counts, blocked);
+        let mut weights = [Rgb::BLACK; LANES];
+        for lane in rays.lanes() {
+            let node = &nodes[lane];
+            let hit = hits.get(lane);
+            weights[lane] = self.through_media(node, hit.map_or(f32::INFINITY, |hit| hit.t));
+            let seen = match hit {
+                Some(_) => light.map(|c| c[lane]).into(),
+                None => scene.background,
+            };
+            self.counts.ends.miss += u64::from(hit.is_none());
+            self.radiance[node.lane as usize] += weights[lane] * seen;
+        }
+        if self.max_depth.is_none() {
+            return;
+        }
+        let before = self.stack.len();
+        self.fork(rays, hits, &points, nodes, &weights);
+        if self.stack.len() - before >= MIN_PACKET {
+            self.gather(before);
         }
     }
 
@@ -389,6 +428,25 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         }
         throughput
     }
+}
+
+/// The radiance along each camera ray of a block, without a tree.
+fn local<Q: RayQuery>(
+    scene: &Scene,
+    query: &Q,
+    camera: &CameraBlock<'_>,
+    counts: &mut RayCounts,
+) -> [Rgb; LANES] {
+    let points = scene.surfaces(camera.rays, camera.hits);
+    counts.ends.miss += u64::from((camera.rays.active() & !points.hit()).count_ones());
+    let blocked = |rays: &RayBlock| query.occluded_block(rays);
+    let radiance = direct_light(scene, camera.rays, &points, counts, blocked);
+    std::array::from_fn(|lane| {
+        if points.hit() >> lane & 1 == 0 {
+            return scene.background;
+        }
+        radiance.map(|c| c[lane]).into()
+    })
 }
 
 /// How far a far camera's ray has come when it starts at the scene's box.

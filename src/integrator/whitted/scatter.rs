@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::{Block, Features, Hits, Node, TexturedHits, Walk};
-use crate::accel::{LANES, RayBlock, RayQuery};
+use crate::accel::{HitBlock, LANES, RayBlock, RayQuery};
 use crate::color::{Rgb, Wavelength};
 use crate::material::{Dielectric, FresnelModel, Material, fresnel};
 use crate::medium::Interior;
@@ -15,10 +15,18 @@ use crate::scene::{Cone, SurfacePoint};
 const MAX_PASSED: u16 = 1 << 12;
 
 /// Fewer rays than this are traced one by one.
-const MIN_PACKET: usize = 6;
+pub(super) const MIN_PACKET: usize = 6;
 
 /// Directions run close together where the cosine between them is above this.
 const COHERENT_COSINE: f32 = 0.99;
+
+/// Rays of a block that may be taken as one: by how they left it, and whether it is known what they come to.
+const GROUPS: [(Way, bool); 4] = [
+    (Way::Refracted, false),
+    (Way::Mirrored, false),
+    (Way::Refracted, true),
+    (Way::Mirrored, true),
+];
 
 /// The first of the two branches of a node's sampler that its children take; its lights take others.
 const BRANCHES: u32 = 1 << 30;
@@ -60,22 +68,28 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     pub(super) fn scatter<const N: usize>(&mut self, hits: &Hits<'_, F, N>, nodes: &[Node; N]) {
         let before = self.stack.len();
         for (lane, node) in nodes.iter().enumerate() {
-            self.children(hits, node, lane);
+            let Some((point, material)) = hits.get(lane) else { continue };
+            if !material.is_specular() {
+                self.counts.ends.diffuse += 1;
+                continue;
+            }
+            self.children(node, point, material, hits.weights[lane], hits.textured.cone(lane));
         }
         if N == LANES && self.stack.len() - before >= MIN_PACKET {
             self.gather(before);
         }
     }
 
-    /// Traces the nodes of the stack from `start` on as blocks where they run close together.
-    fn gather(&mut self, start: usize) {
+    /// Takes the nodes of the stack from `start` on as blocks where they run close together, or where it is known
+    /// what they come to.
+    pub(super) fn gather(&mut self, start: usize) {
         let nodes: Vec<Node> = self.stack.drain(start..).collect();
-        self.stack.extend(nodes.iter().filter(|node| node.known.is_some()));
-        for way in [Way::Refracted, Way::Mirrored] {
-            let group = || nodes.iter().filter(move |node| node.way == way && node.known.is_none());
+        for (way, is_known) in GROUPS {
+            let is_in = |n: &&Node| n.way == way && n.known.is_some() == is_known;
+            let group = || nodes.iter().filter(is_in);
             let Some(first) = group().next() else { continue };
             let is_close = |n: &Node| n.ray.direction.dot(first.ray.direction) > COHERENT_COSINE;
-            if group().count() < MIN_PACKET || !group().all(is_close) {
+            if group().count() < MIN_PACKET || !(is_known || group().all(is_close)) {
                 self.stack.extend(group());
                 continue;
             }
@@ -85,23 +99,31 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
                 rays.set(node.lane as usize, &node.ray);
                 by_lane[node.lane as usize] = *node;
             }
-            let hits = self.query.intersect_block(&rays);
-            self.blocks.push(Block { nodes: by_lane, hits, active: rays.active() });
+            let hits = if is_known {
+                HitBlock::from_fn(rays.active(), |lane| {
+                    by_lane[lane].known.map(|side| side.hit(&by_lane[lane].ray))
+                })
+            } else {
+                self.query.intersect_block(&rays)
+            };
+            self.blocks.push(Block { nodes: by_lane, rays, hits });
         }
     }
 
-    /// The rays that go on from the hit of a lane; none where it has no hit or sends no rays on.
+    /// The rays that go on from a hit of a specular material. `throughput` is what light that leaves the surface
+    /// towards the ray counts for in the pixel.
     #[inline]
-    fn children<const N: usize>(&mut self, hits: &Hits<'_, F, N>, node: &Node, lane: usize) {
-        let Some((point, material)) = hits.get(lane) else { return };
-        if !material.is_specular() {
-            self.counts.ends.diffuse += 1;
-            return;
-        }
+    pub(super) fn children(
+        &mut self,
+        node: &Node,
+        point: &SurfacePoint<'_>,
+        material: &Material,
+        throughput: Rgb,
+        cone: Cone,
+    ) {
         let d = node.ray.direction;
         // A shading normal that faces away from the ray says nothing of its mirror image.
         let n = if point.normal.dot(d) < 0.0 { point.normal } else { point.geometric_normal };
-        let (throughput, cone) = (hits.weights[lane], hits.textured.cone(lane));
         let fork = Fork { node, point, n, throughput, cone };
         if let Material::Dielectric(glass) = material {
             self.through_surface(&fork, glass);
@@ -228,17 +250,42 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Puts the next ray of a branch on the stack, if none of the rules ends it.
     #[inline(always)]
     fn child(&mut self, fork: &Fork<'_>, branch: Branch) {
-        let settings = &self.scene.settings;
         let node = fork.node;
-        let Branch { direction, mut throughput, interior, way, cone, wavelength } = branch;
+        let Branch { direction, throughput, interior, way, cone, wavelength } = branch;
+        let Some((throughput, sampler)) = self.judged(node, throughput, way) else { return };
+        let (ray, known) = self.scene.spawn_on(fork.point, direction);
+        self.stack.push(Node {
+            ray,
+            throughput,
+            interior,
+            sampler,
+            cone,
+            wavelength,
+            depth: node.depth + 1,
+            way,
+            known,
+            before: 0.0,
+            ..*node
+        });
+    }
+
+    /// What the next ray after `node` counts for, if none of the rules ends it, and its sampler.
+    #[inline(always)]
+    pub(super) fn judged(
+        &mut self,
+        node: &Node,
+        mut throughput: Rgb,
+        way: Way,
+    ) -> Option<(Rgb, Sampler)> {
+        let settings = &self.scene.settings;
         let weight = throughput.max_component();
         // What does not count at all was no branch. Also refuses NaN.
         if !(weight > 0.0) {
-            return;
+            return None;
         }
         if node.depth >= self.max_depth.unwrap_or(0) {
             self.counts.ends.depth += 1;
-            return;
+            return None;
         }
         // Elsewhere nothing is drawn at random beyond the camera.
         let sampler = if F::EVERYTHING || settings.roulette {
@@ -249,11 +296,11 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         if weight < settings.prune {
             if !settings.roulette {
                 self.counts.ends.prune += 1;
-                return;
+                return None;
             }
             let survival = weight / settings.prune;
             if !self.survives(&sampler, survival) {
-                return;
+                return None;
             }
             throughput *= 1.0 / survival;
         }
@@ -261,20 +308,6 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             Way::Mirrored => self.counts.reflection += 1,
             Way::Refracted => self.counts.refraction += 1,
         }
-        let (ray, known) = self.scene.spawn_on(fork.point, direction);
-        self.stack.push(Node {
-            ray,
-            throughput,
-            interior,
-            sampler,
-            cone,
-            wavelength,
-            depth: node.depth + 1,
-            passed: node.passed,
-            lane: node.lane,
-            way,
-            known,
-            before: 0.0,
-        });
+        Some((throughput, sampler))
     }
 }

@@ -1,17 +1,18 @@
-//! Direct light alone, a block at a time: the variant without a tree. The loops over lanes are without
+//! Direct light of a block from lights without size, lanes side by side: all that the variant without a tree
+//! has, and what that with mirrors and glass has at each of its blocks. The loops over lanes are without
 //! branches, for the compiler to turn into vector instructions.
 
 #![expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 
-use super::super::{CameraBlock, RayCounts};
-use crate::accel::{LANES, RayQuery, lanes_of, lanes_where};
+use super::super::RayCounts;
+use crate::accel::{LANES, RayBlock, lanes_of, lanes_where};
 use crate::color::Rgb;
-use crate::light::Light;
+use crate::light::{Light, PointLight};
 use crate::math::Vec3Lanes;
 use crate::scene::{Scene, SurfaceBlock};
 
 /// Colours side by side, by component.
-type RgbLanes = [[f32; LANES]; 3];
+pub(super) type RgbLanes = [[f32; LANES]; 3];
 
 /// The light that arrives from one lamp, by lane.
 struct Arriving {
@@ -32,28 +33,33 @@ struct Looks {
     lit: u16,
 }
 
-/// The radiance along each camera ray of a block: what the surfaces show of ambient light and lamps.
-pub(super) fn shade<Q: RayQuery>(
+/// What the surfaces that the rays of a block hit show of ambient light and lamps. `blocked` tells which shadow
+/// rays of a block are.
+#[inline]
+pub(super) fn direct_light(
     scene: &Scene,
-    query: &Q,
-    camera: &CameraBlock<'_>,
+    rays: &RayBlock,
+    points: &SurfaceBlock,
     counts: &mut RayCounts,
-) -> [Rgb; LANES] {
-    let points = scene.surfaces(camera.rays, camera.hits);
-    counts.ends.miss += u64::from((camera.rays.active() & !points.hit()).count_ones());
+    blocked: impl Fn(&RayBlock) -> u16,
+) -> RgbLanes {
     let mut radiance = [[0.0; LANES]; 3];
-    let looks = looks(scene, &points, &mut radiance);
+    let looks = looks(scene, points, &mut radiance);
     for light in scene.lights.iter().filter(|_| looks.lit != 0) {
-        let arriving = arriving(light, &points, looks.lit);
-        let (light, lanes) = reflected(scene, camera, &points, &looks, &arriving);
+        let arriving = arriving(light, points, looks.lit);
+        let (light, lanes) = reflected(scene, rays, points, &looks, &arriving);
         if lanes == 0 {
             continue;
         }
         let mut passes = lanes;
         if scene.settings.shadows.are_cast() {
             counts.shadow += u64::from(lanes.count_ones());
-            let rays = scene.spawn_block(&points, &arriving.direction, &arriving.distance, lanes);
-            passes &= !query.occluded_block(&rays);
+            passes &= !blocked(&scene.spawn_block(
+                points,
+                &arriving.direction,
+                &arriving.distance,
+                lanes,
+            ));
         }
         for (sum, light) in radiance.iter_mut().zip(&light) {
             for i in 0..LANES {
@@ -61,12 +67,7 @@ pub(super) fn shade<Q: RayQuery>(
             }
         }
     }
-    std::array::from_fn(|lane| {
-        if points.hit() >> lane & 1 == 0 {
-            return scene.background;
-        }
-        radiance.map(|c| c[lane]).into()
-    })
+    radiance
 }
 
 /// What is lit and how; their ambient light is added to `radiance`.
@@ -103,6 +104,9 @@ fn arriving(light: &Light, points: &SurfaceBlock, lanes: u16) -> Arriving {
     if let Light::Directional(sun) = light {
         return alike(-sun.direction, f32::INFINITY, sun.irradiance);
     }
+    if let Light::Point(point) = light {
+        return arriving_from(point, &points.position, lanes);
+    }
     let mut arriving = Arriving { lanes: 0, ..alike(glam::Vec3::ZERO, 0.0, Rgb::BLACK) };
     for lane in lanes_of(lanes) {
         let Some(sample) = light.sample(points.position.get(lane), [0.5; 2]) else { continue };
@@ -116,11 +120,30 @@ fn arriving(light: &Light, points: &SurfaceBlock, lanes: u16) -> Arriving {
     arriving
 }
 
+/// What a point sends.
+// Not inlined: the compiler sees best by itself that nothing here overlaps.
+#[inline(never)]
+fn arriving_from(light: &PointLight, positions: &Vec3Lanes<LANES>, lanes: u16) -> Arriving {
+    let mut direction = Vec3Lanes::ZERO;
+    let mut distance = [0.0; LANES];
+    let mut irradiance = [[0.0; LANES]; 3];
+    let mut is_any = [false; LANES];
+    for i in 0..LANES {
+        let (sample, any) = light.sample_always(positions.get(i).as_dvec3());
+        direction.set(i, sample.direction);
+        distance[i] = sample.distance;
+        let Rgb { r, g, b } = sample.irradiance;
+        (irradiance[0][i], irradiance[1][i], irradiance[2][i]) = (r, g, b);
+        is_any[i] = any;
+    }
+    Arriving { direction, distance, irradiance, lanes: lanes & lanes_where(&is_any) }
+}
+
 /// What leaves towards the camera if nothing stands between, and where that is anything.
 #[inline]
 fn reflected(
     scene: &Scene,
-    camera: &CameraBlock<'_>,
+    rays: &RayBlock,
     points: &SurfaceBlock,
     looks: &Looks,
     arriving: &Arriving,
@@ -143,9 +166,9 @@ fn reflected(
     }
     let mut lanes = lanes_where(&is_reflected);
     for lane in lanes_of(looks.others & arriving.lanes) {
-        let (point, l) = (points.point(scene, lane), arriving.direction.get(lane));
-        let response = point.material.response(point.normal, -camera.rays.get(lane).direction, l);
-        if l.dot(point.geometric_normal) > 0.0 && !response.is_black() {
+        let (material, l) = (points.material(scene, lane), arriving.direction.get(lane));
+        let response = material.response(points.normal.get(lane), -rays.get(lane).direction, l);
+        if l.dot(points.geometric_normal.get(lane)) > 0.0 && !response.is_black() {
             for (c, share) in response.to_array().into_iter().enumerate() {
                 light[c][lane] = share * arriving.irradiance[c][lane];
             }
