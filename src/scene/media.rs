@@ -107,12 +107,13 @@ impl Crossing {
     /// all wavelengths.
     #[inline]
     pub fn indices(&self, scene: &Scene, wavelength: f32) -> [f32; 2] {
-        [self.before, self.after].map(|side| match scene.ior(side) {
+        let of = |side| match scene.ior(side) {
             None => 1.0,
             Some(Ior::Constant(n)) => *n as f32,
             Some(ior) if wavelength == 0.0 => ior.n_d() as f32,
             Some(ior) => ior.at(f64::from(wavelength)) as f32,
-        })
+        };
+        [of(self.before), of(self.after)]
     }
 
     /// Whether they depend on the wavelength.

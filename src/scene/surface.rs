@@ -147,21 +147,28 @@ impl Scene {
     /// The ray that leaves `point` into `direction` (unit length) for whatever comes. Within a sphere it will
     /// come to its far side, so that nothing beyond needs to be looked at: what it hits is the same. Where
     /// nothing can be in between either, it is known that it hits that side.
-    #[inline]
+    #[inline(always)]
     pub fn spawn_on(&self, point: &SurfacePoint<'_>, direction: Vec3) -> (Ray, Option<FarSide>) {
         let mut ray = self.spawn(point, direction, f32::INFINITY);
         if let Some((sphere, id)) = point.sphere
             && (direction.dot(point.geometric_normal) < 0.0) == point.is_front
         {
-            let (o, d) = (ray.origin.as_dvec3(), direction.as_dvec3());
-            // By the arithmetic that queries use.
-            if let Some(far) = sphere.intersect(o, d, ray.t_min.into(), f64::INFINITY) {
-                ray.t_max = as_far_as(far.t);
+            let (t, is_within) = sphere.far_side(ray.origin.as_dvec3(), direction.as_dvec3());
+            let t = if is_within && t > f64::from(ray.t_min) { Some(t) } else { far(sphere, &ray) };
+            if let Some(t) = t {
+                ray.t_max = as_far_as(t);
                 return (ray, self.hollows.holds(id).then_some(FarSide(id)));
             }
         }
         (ray, None)
     }
+}
+
+/// Where a ray comes out of a sphere that may not start within it, for all that rounding tells.
+#[cold]
+fn far(sphere: &Sphere, ray: &Ray) -> Option<f64> {
+    let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    sphere.intersect(o, d, ray.t_min.into(), f64::INFINITY).map(|hit| hit.t)
 }
 
 /// The end of a ray that is to hit something at `t` there.

@@ -207,6 +207,8 @@ struct Walk<'a, Q, F> {
     stack: Vec<Node>,
     /// Blocks that have been traced, to be shaded.
     blocks: Vec<Block>,
+    /// Room for rays that left one block.
+    gathered: Vec<Node>,
     radiance: [Rgb; LANES],
     features: PhantomData<F>,
 }
@@ -261,6 +263,7 @@ impl<F: Features> Whitted<F> {
             counts,
             stack: Vec::with_capacity(STACK),
             blocks: Vec::new(),
+            gathered: Vec::new(),
             radiance: [Rgb::BLACK; LANES],
             features: PhantomData,
         };

@@ -83,7 +83,9 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Takes the nodes of the stack from `start` on as blocks where they run close together, or where it is known
     /// what they come to.
     pub(super) fn gather(&mut self, start: usize) {
-        let nodes: Vec<Node> = self.stack.drain(start..).collect();
+        let mut nodes = std::mem::take(&mut self.gathered);
+        nodes.clear();
+        nodes.extend(self.stack.drain(start..));
         for (way, is_known) in GROUPS {
             let is_in = |n: &&Node| n.way == way && n.known.is_some() == is_known;
             let group = || nodes.iter().filter(is_in);
@@ -108,6 +110,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             };
             self.blocks.push(Block { nodes: by_lane, rays, hits });
         }
+        self.gathered = nodes;
     }
 
     /// The rays that go on from a hit of a specular material. `throughput` is what light that leaves the surface
