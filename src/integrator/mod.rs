@@ -9,7 +9,7 @@ mod whitted;
 pub use ao::Ao;
 pub use first_hit::FirstHits;
 pub use flat::Flat;
-pub use whitted::{Everything, Features, Local, TexturedHits, Tree, Whitted};
+pub use whitted::{Everything, Features, Local, Tree, Whitted};
 
 use crate::accel::{HitBlock, LANES, RayBlock, RayQuery};
 use crate::color::Rgb;

@@ -6,28 +6,44 @@ use crate::color::Rgb;
 use crate::light::{Light, LightSample};
 use crate::math::Ray;
 use crate::sampler::Dimensions;
+use crate::scene::SurfacePoint;
 
 /// Branches of a node's sampler: lights of a loop take their own index.
 const CHOICE: u32 = 1 << 31;
 
 impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
+    /// What a surface sends towards the ray of the light of lamps without size, where the scene has no others.
+    #[inline]
+    pub(super) fn lamps(&mut self, node: &Node, point: &SurfacePoint<'_>) -> Rgb {
+        let scene = self.scene;
+        let mut light = Rgb::BLACK;
+        for lamp in &scene.lights {
+            let Some(sample) = lamp.sample(point.position, [0.5; 2]) else { continue };
+            if sample.direction.dot(point.geometric_normal) <= 0.0 {
+                continue;
+            }
+            let response =
+                point.material.response(point.normal, -node.ray.direction, sample.direction);
+            if response.is_black() {
+                continue;
+            }
+            let ray = scene.spawn(point, sample.direction, sample.distance);
+            if !scene.settings.shadows.are_cast() || self.arrives(&ray, node).is_some() {
+                light += response * sample.irradiance;
+            }
+        }
+        light
+    }
+
     /// Adds the light that arrives at the hits from all lights.
     #[inline]
-    pub(super) fn light<const N: usize>(&mut self, hits: &Hits<'_, F, N>, nodes: &[Node; N]) {
+    pub(super) fn light<const N: usize>(&mut self, hits: &Hits<'_, N>, nodes: &[Node; N]) {
         let is_lit = |lane: &usize| hits.get(*lane).is_some_and(|(_, m)| m.is_lit());
         let lit = (0..N).filter(is_lit).fold(0u16, |bits, lane| bits | 1 << lane);
         if lit == 0 {
             return;
         }
         let scene = self.scene;
-        if !F::EVERYTHING {
-            for light in &scene.lights {
-                self.cast::<N>(lit, hits, nodes, true, |lane| {
-                    light.sample(hits.points[lane].as_ref()?.position, [0.5; 2])
-                });
-            }
-            return;
-        }
         // Where there is a tree, those that are everywhere alike stand outside.
         let count = scene.light_tree.as_ref().map_or(scene.lights.len(), |t| t.always().len());
         for i in 0..count {
@@ -71,7 +87,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     fn cast<const N: usize>(
         &mut self,
         lit: u16,
-        hits: &Hits<'_, F, N>,
+        hits: &Hits<'_, N>,
         nodes: &[Node; N],
         is_coherent: bool,
         sample: impl Fn(usize) -> Option<LightSample>,
@@ -96,15 +112,14 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             }
             let ray = scene.spawn(point, sample.direction, sample.distance);
             let mut light = response * sample.irradiance * hits.weights[lane];
-            if F::EVERYTHING
-                && let Some(fog) = &scene.fog
+            if let Some(fog) = &scene.fog
                 && fog.dims_lights
                 && sample.distance.is_finite()
                 && node.interior.is_outside()
             {
                 light *= fog.transmittance(&ray, sample.distance);
             }
-            if F::EVERYTHING && !scene.volumes.is_empty() && scene.settings.shadows.are_cast() {
+            if !scene.volumes.is_empty() && scene.settings.shadows.are_cast() {
                 // Also where a packet says what is occluded.
                 shadow_rays[lane] = ray;
             }

@@ -38,55 +38,6 @@ pub trait Features: Send + Sync + 'static {
     const TREE: bool;
     /// Textures, area lights, many lights, glowing surfaces, fog, light dimmed by glass, dispersion.
     const EVERYTHING: bool;
-    /// What is kept of up to `N` hits for textures: nothing where there are none.
-    type Textured<const N: usize>: TexturedHits;
-}
-
-/// What textures make of hits, by lane.
-pub trait TexturedHits {
-    /// Nothing yet.
-    fn none() -> Self;
-    /// Notes how wide the ray is at its hit, and the material if textures changed it.
-    fn set(&mut self, lane: usize, cone: Cone, material: Option<Material>);
-    /// The material that textures made.
-    fn material(&self, lane: usize) -> Option<&Material>;
-    /// How wide the ray is there.
-    fn cone(&self, lane: usize) -> Cone;
-}
-
-/// A scene without textures.
-impl TexturedHits for () {
-    #[inline]
-    fn none() {}
-    #[inline]
-    fn set(&mut self, _lane: usize, _cone: Cone, _material: Option<Material>) {}
-    #[inline]
-    fn material(&self, _lane: usize) -> Option<&Material> {
-        None
-    }
-    #[inline]
-    fn cone(&self, _lane: usize) -> Cone {
-        Cone::default()
-    }
-}
-
-impl<const N: usize> TexturedHits for [(Cone, Option<Material>); N] {
-    #[inline]
-    fn none() -> Self {
-        std::array::from_fn(|_| (Cone::default(), None))
-    }
-    #[inline]
-    fn set(&mut self, lane: usize, cone: Cone, material: Option<Material>) {
-        self[lane] = (cone, material);
-    }
-    #[inline]
-    fn material(&self, lane: usize) -> Option<&Material> {
-        self[lane].1.as_ref()
-    }
-    #[inline]
-    fn cone(&self, lane: usize) -> Cone {
-        self[lane].0
-    }
 }
 
 /// Lamps, diffuse and shiny surfaces: camera and shadow rays.
@@ -104,19 +55,16 @@ pub struct Everything;
 impl Features for Local {
     const TREE: bool = false;
     const EVERYTHING: bool = false;
-    type Textured<const N: usize> = ();
 }
 
 impl Features for Tree {
     const TREE: bool = true;
     const EVERYTHING: bool = false;
-    type Textured<const N: usize> = ();
 }
 
 impl Features for Everything {
     const TREE: bool = true;
     const EVERYTHING: bool = true;
-    type Textured<const N: usize> = [(Cone, Option<Material>); N];
 }
 
 /// The ray tree, in the variant `F`.
@@ -173,18 +121,19 @@ struct Block {
     hits: HitBlock,
 }
 
-/// The surfaces that up to `N` rays hit, by lane.
-struct Hits<'s, F: Features, const N: usize> {
+/// The surfaces that up to `N` rays hit, by lane, with all there is.
+struct Hits<'s, const N: usize> {
     points: [Option<SurfacePoint<'s>>; N],
     /// What light that leaves the surface towards the ray counts for in the pixel.
     weights: [Rgb; N],
-    textured: F::Textured<N>,
+    /// How wide the ray is there, and the material if textures changed it.
+    textured: [(Cone, Option<Material>); N],
 }
 
-impl<'s, F: Features, const N: usize> Hits<'s, F, N> {
+impl<'s, const N: usize> Hits<'s, N> {
     #[inline]
     fn none() -> Self {
-        let textured = F::Textured::<N>::none();
+        let textured = std::array::from_fn(|_| (Cone::default(), None));
         Self { points: [const { None }; N], weights: [Rgb::BLACK; N], textured }
     }
 
@@ -192,7 +141,7 @@ impl<'s, F: Features, const N: usize> Hits<'s, F, N> {
     #[inline]
     fn get(&self, lane: usize) -> Option<(&SurfacePoint<'s>, &Material)> {
         let point = self.points[lane].as_ref()?;
-        Some((point, self.textured.material(lane).unwrap_or(point.material)))
+        Some((point, self.textured[lane].1.as_ref().unwrap_or(point.material)))
     }
 }
 
@@ -273,7 +222,7 @@ impl<F: Features> Whitted<F> {
                 cone: if F::EVERYTHING { Cone::of_pixel(scene, &ray) } else { Cone::default() },
                 ray,
                 throughput: Rgb::splat(1.0),
-                interior: if F::TREE { scene.camera_interior } else { Interior::OUTSIDE },
+                interior: scene.camera_interior,
                 sampler: camera.samplers[lane],
                 wavelength: 0.0,
                 depth: 0,
@@ -309,14 +258,44 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
                     Some(side) => Some(side.hit(&node.ray)),
                     None => self.query.intersect(&node.ray),
                 };
-                self.shade(1, std::array::from_ref(&node), |_| hit.as_ref());
+                self.shade_one(&node, hit.as_ref());
             }
             let Some(Block { nodes, rays, hits }) = self.blocks.pop() else { return };
             self.shade_block(&rays, &hits, &nodes);
         }
     }
 
-    /// As [`Walk::shade`], of a block of rays that run close together.
+    /// Shades what one ray hit.
+    #[inline]
+    fn shade_one(&mut self, node: &Node, hit: Option<&Hit>) {
+        if F::EVERYTHING {
+            self.shade(1, std::array::from_ref(node), |_| hit);
+            return;
+        }
+        let scene = self.scene;
+        let weight = self.through_media(node, hit.map_or(f32::INFINITY, |hit| hit.t));
+        let Some(hit) = hit else {
+            self.counts.ends.miss += 1;
+            self.radiance[node.lane as usize] += weight * scene.background;
+            return;
+        };
+        let point = scene.surface(&node.ray, hit);
+        let material = point.material;
+        if material.is_lit() {
+            let light = material.ambient() * scene.ambient + self.lamps(node, &point);
+            self.radiance[node.lane as usize] += weight * light;
+        }
+        if self.max_depth.is_none() {
+            return;
+        }
+        if material.is_specular() {
+            self.children(node, &point, material, weight, Cone::default());
+        } else {
+            self.counts.ends.diffuse += 1;
+        }
+    }
+
+    /// Shades the hits of a block of rays that run close together.
     fn shade_block(&mut self, rays: &RayBlock, hits: &HitBlock, nodes: &[Node; LANES]) {
         if F::EVERYTHING {
             self.shade(rays.active(), nodes, |lane| hits.get(lane));
@@ -352,7 +331,8 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         }
     }
 
-    /// Adds the light of the hits of up to `N` rays to their pixels, and sends their children on.
+    /// Adds the light of the hits of up to `N` rays to their pixels, with all there is, and sends their children
+    /// on.
     #[inline]
     fn shade<'h, const N: usize>(
         &mut self,
@@ -361,7 +341,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         hit: impl Fn(usize) -> Option<&'h Hit>,
     ) {
         let scene = self.scene;
-        let mut hits = Hits::<F, N>::none();
+        let mut hits = Hits::<N>::none();
         for lane in (0..N).filter(|lane| active >> lane & 1 == 1) {
             let node = &nodes[lane];
             let hit = hit(lane);
@@ -373,14 +353,11 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             };
             hits.weights[lane] = weight;
             let point = hits.points[lane].insert(scene.surface(&node.ray, hit));
-            if F::EVERYTHING {
-                if scene.has_maps() {
-                    let cone = scene.widened(node.cone, hit, point.position);
-                    let material = scene.apply_maps(hit, cone.width, point);
-                    hits.textured.set(lane, cone, material);
-                }
-                self.radiance[node.lane as usize] += weight * scene.emission(point);
+            if scene.has_maps() {
+                let cone = scene.widened(node.cone, hit, point.position);
+                hits.textured[lane] = (cone, scene.apply_maps(hit, cone.width, point));
             }
+            self.radiance[node.lane as usize] += weight * scene.emission(point);
             if let Some((_, material)) = hits.get(lane)
                 && material.is_lit()
             {
@@ -388,7 +365,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             }
         }
         self.light(&hits, nodes);
-        if F::TREE && self.max_depth.is_some() {
+        if self.max_depth.is_some() {
             self.scatter(&hits, nodes);
         }
     }
@@ -416,7 +393,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         if F::EVERYTHING && !self.scene.volumes.is_empty() {
             return self.through_volumes(node, distance);
         }
-        if F::TREE && !node.interior.is_outside() {
+        if !node.interior.is_outside() {
             if self.scene.requirements.absorbing > 0
                 && let Some(medium) = self.scene.medium(node.interior)
             {

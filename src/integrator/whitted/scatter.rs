@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::{Block, Features, Hits, Node, TexturedHits, Walk};
+use super::{Block, Features, Hits, Node, Walk};
 use crate::accel::{HitBlock, LANES, RayBlock, RayQuery};
 use crate::color::{Rgb, Wavelength};
 use crate::material::{Dielectric, FresnelModel, Material, fresnel};
@@ -65,7 +65,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Sends the rays of all specular hits on: they wait on the stack, but for those of a block that
     /// run close together, which are traced as one.
     #[inline]
-    pub(super) fn scatter<const N: usize>(&mut self, hits: &Hits<'_, F, N>, nodes: &[Node; N]) {
+    pub(super) fn scatter<const N: usize>(&mut self, hits: &Hits<'_, N>, nodes: &[Node; N]) {
         let before = self.stack.len();
         for (lane, node) in nodes.iter().enumerate() {
             let Some((point, material)) = hits.get(lane) else { continue };
@@ -73,7 +73,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
                 self.counts.ends.diffuse += 1;
                 continue;
             }
-            self.children(node, point, material, hits.weights[lane], hits.textured.cone(lane));
+            self.children(node, point, material, hits.weights[lane], hits.textured[lane].0);
         }
         if N == LANES && self.stack.len() - before >= MIN_PACKET {
             self.gather(before);
