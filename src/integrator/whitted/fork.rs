@@ -2,8 +2,6 @@
 //! which is still asked where there is more to a surface than mirrored and refracted light. The loops over lanes
 //! are without branches, for the compiler to turn into vector instructions.
 
-#![expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
-
 use super::scatter::Way;
 use super::{Features, Node, Walk};
 use crate::accel::{HitBlock, LANES, RayBlock, RayQuery, lanes_of, lanes_where};
