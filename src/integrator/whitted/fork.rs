@@ -2,7 +2,7 @@
 //! which is still asked where there is more to a surface than mirrored and refracted light. The loops over lanes
 //! are without branches, for the compiler to turn into vector instructions.
 
-use super::scatter::Way;
+use super::scatter::{Branch, Way};
 use super::{Features, Node, Walk};
 use crate::accel::{HitBlock, LANES, RayBlock, RayQuery, lanes_of, lanes_where};
 use crate::color::Rgb;
@@ -79,47 +79,26 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             let lanes = mirrors | glass;
             let (next, known) = scene.spawn_block_on(points, hits, &mirrored.direction, lanes);
             for lane in lanes_of(lanes) {
-                let node = &nodes[lane];
                 let share = match &refracted {
                     Some(refracted) if glass >> lane & 1 == 1 => {
                         Rgb::splat(refracted.reflected[lane])
                     }
                     _ => points.material(scene, lane).mirrored(mirrored.cos_i[lane]),
                 };
-                if let Some((throughput, sampler)) =
-                    self.judged(node, weights[lane] * share, Way::Mirrored)
-                {
-                    self.stack.push(Node {
-                        ray: next.get(lane),
-                        throughput,
-                        sampler,
-                        depth: node.depth + 1,
-                        way: Way::Mirrored,
-                        known: known[lane],
-                        ..*node
-                    });
-                }
+                let Node { interior, cone, wavelength, .. } = nodes[lane];
+                let (throughput, way) = (weights[lane] * share, Way::Mirrored);
+                let branch = Branch { throughput, interior, way, cone, wavelength };
+                self.child(&nodes[lane], branch, |_| (next.get(lane), known[lane]));
             }
             if let Some(refracted) = &refracted {
                 let lanes = glass & refracted.lanes;
                 let (next, known) = scene.spawn_block_on(points, hits, &refracted.direction, lanes);
                 for lane in lanes_of(lanes) {
-                    let node = &nodes[lane];
-                    let share = 1.0 - refracted.reflected[lane];
-                    if let Some((throughput, sampler)) =
-                        self.judged(node, weights[lane] * share, Way::Refracted)
-                    {
-                        self.stack.push(Node {
-                            ray: next.get(lane),
-                            throughput,
-                            interior: beyond[lane],
-                            sampler,
-                            depth: node.depth + 1,
-                            way: Way::Refracted,
-                            known: known[lane],
-                            ..*node
-                        });
-                    }
+                    let Node { cone, wavelength, .. } = nodes[lane];
+                    let throughput = weights[lane] * (1.0 - refracted.reflected[lane]);
+                    let (interior, way) = (beyond[lane], Way::Refracted);
+                    let branch = Branch { throughput, interior, way, cone, wavelength };
+                    self.child(&nodes[lane], branch, |_| (next.get(lane), known[lane]));
                 }
             }
         }

@@ -7,9 +7,10 @@ use super::{Block, Features, Hits, Node, Walk};
 use crate::accel::{HitBlock, LANES, RayBlock, RayQuery};
 use crate::color::{Rgb, Wavelength};
 use crate::material::{Dielectric, FresnelModel, Material, fresnel};
+use crate::math::Ray;
 use crate::medium::Interior;
 use crate::sampler::{Dimensions, Sampler};
-use crate::scene::{Cone, SurfacePoint};
+use crate::scene::{Cone, FarSide, Scene, SurfacePoint};
 
 /// Surfaces between equal media that a ray passes at most.
 const MAX_PASSED: u16 = 1 << 12;
@@ -51,14 +52,13 @@ struct Fork<'a> {
     cone: Cone,
 }
 
-/// A ray that is to go on from a hit.
-struct Branch {
-    direction: Vec3,
-    throughput: Rgb,
-    interior: Interior,
-    way: Way,
-    cone: Cone,
-    wavelength: f32,
+/// A ray that is to go on from a hit, but for where it runs.
+pub(super) struct Branch {
+    pub(super) throughput: Rgb,
+    pub(super) interior: Interior,
+    pub(super) way: Way,
+    pub(super) cone: Cone,
+    pub(super) wavelength: f32,
 }
 
 impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
@@ -146,7 +146,8 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         }
         let (interior, way) = (fork.node.interior, Way::Mirrored);
         let cone = fork.cone.turned(2.0);
-        self.child(fork, Branch { direction, throughput, interior, way, cone, wavelength });
+        let branch = Branch { throughput, interior, way, cone, wavelength };
+        self.child(fork.node, branch, |scene| scene.spawn_on(fork.point, direction));
     }
 
     /// The two rays of a surface between two media: of glass and air, of two glasses, or of one
@@ -200,7 +201,8 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         let throughput = of_one * (1.0 - reflected);
         let (interior, way) = (crossing.beyond, Way::Refracted);
         let cone = fork.cone.turned((1.0 - n_i / n_t).abs());
-        self.child(fork, Branch { direction, throughput, interior, way, cone, wavelength });
+        let branch = Branch { throughput, interior, way, cone, wavelength };
+        self.child(fork.node, branch, |scene| scene.spawn_on(fork.point, direction));
     }
 
     /// The ray that goes straight on, through a surface that is none.
@@ -250,13 +252,17 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         goes_on
     }
 
-    /// Puts the next ray of a branch on the stack, if none of the rules ends it.
+    /// Puts the next ray of a branch on the stack, if none of the rules ends it; only then is it asked for.
     #[inline(always)]
-    fn child(&mut self, fork: &Fork<'_>, branch: Branch) {
-        let node = fork.node;
-        let Branch { direction, throughput, interior, way, cone, wavelength } = branch;
+    pub(super) fn child(
+        &mut self,
+        node: &Node,
+        branch: Branch,
+        ray: impl FnOnce(&Scene) -> (Ray, Option<FarSide>),
+    ) {
+        let Branch { throughput, interior, way, cone, wavelength } = branch;
         let Some((throughput, sampler)) = self.judged(node, throughput, way) else { return };
-        let (ray, known) = self.scene.spawn_on(fork.point, direction);
+        let (ray, known) = ray(self.scene);
         self.stack.push(Node {
             ray,
             throughput,
@@ -274,12 +280,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
 
     /// What the next ray after `node` counts for, if none of the rules ends it, and its sampler.
     #[inline(always)]
-    pub(super) fn judged(
-        &mut self,
-        node: &Node,
-        mut throughput: Rgb,
-        way: Way,
-    ) -> Option<(Rgb, Sampler)> {
+    fn judged(&mut self, node: &Node, mut throughput: Rgb, way: Way) -> Option<(Rgb, Sampler)> {
         let settings = &self.scene.settings;
         let weight = throughput.max_component();
         // What does not count at all was no branch. Also refuses NaN.
