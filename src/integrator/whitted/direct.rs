@@ -139,7 +139,7 @@ fn arriving_from(light: &PointLight, positions: &Vec3Lanes<LANES>, lanes: u16) -
     Arriving { direction, distance, irradiance, lanes: lanes & lanes_where(&is_any) }
 }
 
-/// What leaves towards the camera if nothing stands between, and where that is anything.
+/// What leaves towards the rays if nothing stands between, and where that is anything.
 #[inline]
 fn reflected(
     scene: &Scene,

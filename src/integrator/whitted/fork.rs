@@ -2,7 +2,7 @@
 //! which is still asked where there is more to a surface than mirrored and refracted light. The loops over lanes
 //! are without branches, for the compiler to turn into vector instructions.
 
-use super::scatter::{Branch, Way};
+use super::scatter::{Branch, Way, mirror_normal, mirrored_direction};
 use super::{Features, Node, Walk};
 use crate::accel::{HitBlock, LANES, RayBlock, RayQuery, lanes_of, lanes_where};
 use crate::color::Rgb;
@@ -120,14 +120,9 @@ fn mirrored(rays: &RayBlock, points: &SurfaceBlock) -> Mirrored {
         Mirrored { direction: Vec3Lanes::ZERO, normal: Vec3Lanes::ZERO, cos_i: [0.0; LANES] };
     for i in 0..LANES {
         let d = rays.get(i).direction;
-        let (surface, shading) = (points.geometric_normal.get(i), points.normal.get(i));
-        // A shading normal that faces away from the ray says nothing of its mirror image.
-        let n = if shading.dot(d) < 0.0 { shading } else { surface };
-        // An interpolated normal may send it into the surface.
-        let by_shading = fresnel::reflect(d, n);
-        let by_surface = fresnel::reflect(d, surface);
-        let is_out = by_shading.dot(surface) > 0.0;
-        mirrored.direction.set(i, if is_out { by_shading } else { by_surface });
+        let geometric = points.geometric_normal.get(i);
+        let n = mirror_normal(d, points.normal.get(i), geometric);
+        mirrored.direction.set(i, mirrored_direction(d, n, geometric));
         mirrored.normal.set(i, n);
         mirrored.cos_i[i] = -d.dot(n);
     }

@@ -137,7 +137,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         let mut occluded = 0;
         if casts_shadows && let Some(packet) = &packet {
             self.counts.shadow += u64::from(waiting.count_ones());
-            occluded = self.blocked(packet);
+            occluded = Self::blocked(scene, self.query, packet);
         }
         for lane in (0..N).filter(|lane| waiting >> lane & 1 == 1) {
             let to = nodes[lane].lane as usize;

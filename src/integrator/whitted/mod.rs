@@ -303,11 +303,8 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         }
         let scene = self.scene;
         let points = scene.surfaces(rays, hits);
-        let (query, is_clear) = (self.query, scene.requirements.clear_shadows);
-        let blocked = |rays: &RayBlock| match is_clear {
-            true => query.occluded_by_opaque_block(rays),
-            false => query.occluded_block(rays),
-        };
+        let query = self.query;
+        let blocked = |rays: &RayBlock| Self::blocked(scene, query, rays);
         let light = direct_light(scene, rays, &points, self.counts, blocked);
         let mut weights = [Rgb::BLACK; LANES];
         for lane in rays.lanes() {

@@ -61,6 +61,21 @@ pub(super) struct Branch {
     pub(super) wavelength: f32,
 }
 
+/// The normal by which light from `d` is mirrored, of the shading and the geometric one on its side: a shading
+/// normal that faces away from the ray says nothing of its mirror image. Without branches, as the next.
+#[inline(always)]
+pub(super) fn mirror_normal(d: Vec3, shading: Vec3, geometric: Vec3) -> Vec3 {
+    if shading.dot(d) < 0.0 { shading } else { geometric }
+}
+
+/// The mirrored direction by the normal `n`, but for where an interpolated or mapped one sends it into the
+/// surface.
+#[inline(always)]
+pub(super) fn mirrored_direction(d: Vec3, n: Vec3, geometric: Vec3) -> Vec3 {
+    let (by_n, by_geometric) = (fresnel::reflect(d, n), fresnel::reflect(d, geometric));
+    if by_n.dot(geometric) > 0.0 { by_n } else { by_geometric }
+}
+
 impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Sends the rays of all specular hits on: they wait on the stack, but for those of a block that
     /// run close together, which are traced as one.
@@ -125,8 +140,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         cone: Cone,
     ) {
         let d = node.ray.direction;
-        // A shading normal that faces away from the ray says nothing of its mirror image.
-        let n = if point.normal.dot(d) < 0.0 { point.normal } else { point.geometric_normal };
+        let n = mirror_normal(d, point.normal, point.geometric_normal);
         let fork = Fork { node, point, n, throughput, cone };
         if let Material::Dielectric(glass) = material {
             self.through_surface(&fork, glass);
@@ -139,11 +153,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     #[inline(always)]
     fn mirrored(&mut self, fork: &Fork<'_>, throughput: Rgb, wavelength: f32) {
         let d = fork.node.ray.direction;
-        let mut direction = fresnel::reflect(d, fork.n);
-        // An interpolated or mapped normal may send it into the surface.
-        if direction.dot(fork.point.geometric_normal) <= 0.0 {
-            direction = fresnel::reflect(d, fork.point.geometric_normal);
-        }
+        let direction = mirrored_direction(d, fork.n, fork.point.geometric_normal);
         let (interior, way) = (fork.node.interior, Way::Mirrored);
         let cone = fork.cone.turned(2.0);
         let branch = Branch { throughput, interior, way, cone, wavelength };

@@ -6,7 +6,7 @@ use crate::color::Rgb;
 use crate::material::{Material, fresnel};
 use crate::math::Ray;
 use crate::medium::beer_lambert;
-use crate::scene::Shadows;
+use crate::scene::{Scene, Shadows};
 
 /// Surfaces of glass that one shadow ray passes at most.
 const MAX_SURFACES: u32 = 1 << 12;
@@ -21,11 +21,11 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
 
     /// Which shadow rays of a block are blocked, where they are so or not at all.
     #[inline]
-    pub(super) fn blocked(&self, rays: &RayBlock) -> u16 {
-        if F::TREE && self.scene.requirements.clear_shadows {
-            return self.query.occluded_by_opaque_block(rays);
+    pub(super) fn blocked(scene: &Scene, query: &Q, rays: &RayBlock) -> u16 {
+        if scene.requirements.clear_shadows {
+            return query.occluded_by_opaque_block(rays);
         }
-        self.query.occluded_block(rays)
+        query.occluded_block(rays)
     }
 
     /// The share of light that comes along a shadow ray of `node`'s hit; none where something opaque
@@ -36,7 +36,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         if self.is_tinted() {
             return self.through_glass(ray, node);
         }
-        let is_blocked = if F::TREE && self.scene.requirements.clear_shadows {
+        let is_blocked = if self.scene.requirements.clear_shadows {
             self.query.occluded_by_opaque(ray)
         } else {
             self.query.occluded(ray)
