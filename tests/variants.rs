@@ -18,6 +18,8 @@ const LOCAL: &[&str] = &[
     "type = \"diffuse\"\nreflectance = [0.7, 0.2, 0.1]",
     "type = \"phong\"\ndiffuse = [0.1, 0.3, 0.6]\nspecular = 0.8\nshininess = 20",
     "type = \"phong\"\nspecular = 0.5\nmodel = \"phong\"",
+    "type = \"phong\"\ndiffuse = 0.0\nspecular = 0.9\nmodel = \"phong\"",
+    "type = \"diffuse\"\nreflectance = 0.0",
 ];
 const TREE: &[&str] = &[
     "type = \"mirror\"\nreflectance = [0.9, 0.8, 0.7]",
@@ -26,9 +28,11 @@ const TREE: &[&str] = &[
     "type = \"conductor\"\neta = [0.2, 0.92, 1.1]\nk = [3.9, 2.45, 2.14]",
     "type = \"phong\"\ndiffuse = [0.25, 0.02, 0.02]\nmirror = 1.0\nfresnel = \"exact\"",
     "type = \"dielectric\"\nfresnel = \"schlick\"",
+    "type = \"dielectric\"\nior = 1.0\nabsorption = [2.0, 0.3, 0.7]",
+    "type = \"dielectric\"\nior = 0.7",
 ];
 
-/// Balls, an ellipsoid and copies on a floor, under some of the lamps that need nothing.
+/// Balls, an ellipsoid, copies and a wall on a floor, under some of the lamps that need nothing.
 fn random_scene(random: &mut Random, materials: &[&str]) -> String {
     let mut text = "[image]\nsize = [44, 33]\nbackground = [0.2, 0.3, 0.5]\n\
         [ambient]\nradiance = [0.1, 0.15, 0.2]\n"
@@ -38,20 +42,25 @@ fn random_scene(random: &mut Random, materials: &[&str]) -> String {
     let (shadows, roulette) =
         (pick(random, &["true", "true", "false"]), pick(random, &["true", "false"]));
     let lens = pick(random, &["0.0", "0.1"]);
+    let depth = pick(random, &["1", "3", "8"]);
     write!(
         text,
         "[camera]\neye = [0, 2.5, 6]\ntarget = [0, 0.5, 0]\nlens_radius = {lens}\n\
          [render]\nsamples = 3\nintegrator = \"{integrator}\"\nshadows = {shadows}\n\
-         roulette = {roulette}\nprune = 0.02\n"
+         roulette = {roulette}\nprune = 0.02\nmax_depth = {depth}\n"
     )
     .unwrap();
     for (i, material) in materials.iter().enumerate() {
         write!(text, "[materials.m{i}]\n{material}\n").unwrap();
     }
+    // One hangs among the balls, one is off, one shines on the back of the wall.
     let lights = [
+        "type = \"point\"\nposition = [0.2, 1.3, 0.1]\nintensity = 3",
+        "type = \"point\"\nposition = [0, 4, 0]\nintensity = 0",
         "type = \"point\"\nposition = [3, 5, 4]\nintensity = 80",
         "type = \"point\"\nposition = [-3, 4, 2]\nintensity = 0.5\nfalloff = \"none\"",
         "type = \"directional\"\ndirection = [-0.6, -1.0, -0.5]\nirradiance = [2, 1.5, 1]",
+        "type = \"directional\"\ndirection = [0.3, -0.6, 0.7]\nirradiance = 2",
         "type = \"spot\"\nposition = [0, 4, 2]\ndirection = [0, -1, -0.4]\nintensity = 60\ncone_angle = 40",
     ];
     for _ in 0..1 + random.below(3) {
@@ -78,13 +87,31 @@ fn random_scene(random: &mut Random, materials: &[&str]) -> String {
         )
         .unwrap();
     }
+    let wall = random.below(materials.len());
+    write!(text, "[[objects]]\nmesh = \"wall.obj\"\nmaterial = \"m{wall}\"\n").unwrap();
     text
 }
 
-fn build(text: &str, kind: AccelKind) -> Scene {
+/// A wall that the camera sees at a flat angle, and whose shading normals lean far from it, some to its other side.
+fn wall(random: &mut Random) -> String {
+    let mut text = String::new();
+    for i in 0..25u32 {
+        let (z, y) = (f64::from(i % 5) - 2.5, 0.6 * f64::from(i / 5));
+        let mut lean = |low: f64| random.between(low, 2.0);
+        write!(text, "v -1.5 {y} {z}\nvn {} {} {}\n", lean(-0.6), lean(-2.0), lean(-2.0)).unwrap();
+    }
+    for i in (1..25u32).filter(|i| i % 5 != 0 && *i < 21) {
+        let [a, b, c, d] = [i, i + 1, i + 6, i + 5];
+        writeln!(text, "f {a}//{a} {b}//{b} {c}//{c} {d}//{d}").unwrap();
+    }
+    text
+}
+
+fn build(text: &str, wall: &str, kind: AccelKind) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.toml");
     std::fs::write(&path, text).unwrap();
+    std::fs::write(folder.path().join("wall.obj"), wall).unwrap();
     let loaded =
         load_scene(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}\n{text}"));
     Scene::build_quietly(loaded.scene, kind).unwrap()
@@ -110,10 +137,10 @@ fn are_alike(a: &[[f32; 3]], b: &[[f32; 3]]) -> bool {
 fn check(materials: &[&str], expected: Variant, seed: u64) {
     let mut random = Random(seed);
     let mut met = 0;
-    for round in 0..if common::verify() { 400 } else { 12 } {
-        let text = random_scene(&mut random, materials);
+    for round in 0..if common::verify() { 400 } else { 20 } {
+        let (text, wall) = (random_scene(&mut random, materials), wall(&mut random));
         for &kind in AccelKind::ALL {
-            let scene = build(&text, kind);
+            let scene = build(&text, &wall, kind);
             let least = scene.requirements.variant;
             assert!(least <= expected, "{least:?} for\n{text}");
             met += u32::from(least == expected);

@@ -6,7 +6,8 @@ use glam::Vec3;
 use super::{Block, Features, Hits, Node, Walk};
 use crate::accel::{HitBlock, LANES, RayBlock, RayQuery};
 use crate::color::{Rgb, Wavelength};
-use crate::material::{Dielectric, FresnelModel, Material, fresnel};
+use crate::material::fresnel::{self, Refraction};
+use crate::material::{Dielectric, FresnelModel, Material};
 use crate::math::Ray;
 use crate::medium::Interior;
 use crate::sampler::{Dimensions, Sampler};
@@ -74,6 +75,16 @@ pub(super) fn mirror_normal(d: Vec3, shading: Vec3, geometric: Vec3) -> Vec3 {
 pub(super) fn mirrored_direction(d: Vec3, n: Vec3, geometric: Vec3) -> Vec3 {
     let (by_n, by_geometric) = (fresnel::reflect(d, n), fresnel::reflect(d, geometric));
     if by_n.dot(geometric) > 0.0 { by_n } else { by_geometric }
+}
+
+/// The refracted direction, but for where an interpolated or mapped normal sends it out of the surface: as with
+/// mirrors, the surface itself decides.
+#[inline]
+fn refracted_direction(d: Vec3, bent: &Refraction, geometric: Vec3) -> Vec3 {
+    if bent.direction.dot(geometric) < 0.0 {
+        return bent.direction;
+    }
+    fresnel::refract(d, geometric, bent.eta).map_or(d, |bent| bent.direction)
 }
 
 impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
@@ -202,12 +213,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
         }
         let Some(bent) = bent else { return };
 
-        let mut direction = bent.direction;
-        // As with mirrors, the surface itself decides.
-        if direction.dot(point.geometric_normal) >= 0.0 {
-            direction = fresnel::refract(d, point.geometric_normal, n_t / n_i)
-                .map_or(d, |bent| bent.direction);
-        }
+        let direction = refracted_direction(d, &bent, point.geometric_normal);
         let throughput = of_one * (1.0 - reflected);
         let (interior, way) = (crossing.beyond, Way::Refracted);
         let cone = fork.cone.turned((1.0 - n_i / n_t).abs());
@@ -323,5 +329,65 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             Way::Refracted => self.counts.refraction += 1,
         }
         Some((throughput, sampler))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn unit() -> impl Strategy<Value = Vec3> {
+        let turn = 0.0f32..std::f32::consts::TAU;
+        (-1.0f32..1.0, turn).prop_map(|(z, phi)| {
+            let (sin, cos) = phi.sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            Vec3::new(r * cos, r * sin, z)
+        })
+    }
+
+    proptest! {
+        /// What a mirror does with each of two normals is as written: d − 2(d·n)n by the shading normal where
+        /// that faces the ray and the light leaves the surface, else by the surface itself; and it leaves.
+        #[test]
+        fn mirrored_light_leaves_the_surface(d in unit(), shading in unit(), geometric in unit()) {
+            let geometric = if geometric.dot(d) > 0.0 { -geometric } else { geometric };
+            prop_assume!(geometric.dot(d) < -1e-4);
+            let by = |n: Vec3| {
+                let (d, n) = (d.as_dvec3(), n.as_dvec3());
+                d - 2.0 * d.dot(n) * n
+            };
+            let n = mirror_normal(d, shading, geometric);
+            let mirrored = mirrored_direction(d, n, geometric);
+            let leaves = by(shading).dot(geometric.as_dvec3());
+            prop_assume!(leaves.abs() > 1e-4 && shading.dot(d).abs() > 1e-4);
+            let is_by_shading = shading.dot(d) < 0.0 && leaves > 0.0;
+            let expected = by(if is_by_shading { shading } else { geometric });
+            prop_assert!(mirrored.as_dvec3().abs_diff_eq(expected, 1e-6), "{mirrored} {expected}");
+            prop_assert!(mirrored.dot(geometric) > 0.0);
+            prop_assert!(n.dot(d) < 0.0, "the angle of incidence");
+        }
+
+        /// Refracted light enters the surface, by the shading normal where that sends it there.
+        #[test]
+        fn refracted_light_enters_the_surface(
+            d in unit(),
+            n in unit(),
+            geometric in unit(),
+            eta in 0.4f32..2.5,
+        ) {
+            let [n, geometric] = [n, geometric].map(|n| if n.dot(d) > 0.0 { -n } else { n });
+            prop_assume!(geometric.dot(d) < -1e-3);
+            let Some(bent) = fresnel::refract(d, n, eta) else { return Ok(()) };
+            let entered = refracted_direction(d, &bent, geometric);
+            prop_assert!(entered.dot(geometric) < 0.0, "{entered}");
+            let is_by_shading = bent.direction.dot(geometric) < 0.0;
+            prop_assert!(!is_by_shading || entered == bent.direction);
+            // Snell's law by the surface itself: what lies along it shrinks as the index grows.
+            let along = |v: Vec3| v.cross(geometric).length();
+            if !is_by_shading && along(d) < 0.99 * eta {
+                prop_assert!((along(entered) * eta - along(d)).abs() < 1e-5, "{entered}");
+            }
+        }
     }
 }
