@@ -1,5 +1,6 @@
 //! How the tree lies in memory.
 
+use super::simd::prefetch;
 use crate::geometry::Sphere;
 
 /// Children of a node, triangles or spheres of a leaf.
@@ -123,6 +124,16 @@ pub(super) struct Tree {
 }
 
 impl Tree {
+    /// Has the processor bring a child that will be visited.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, child: Child) {
+        match child.content() {
+            Content::Node(index) => self.nodes.get(index).map_or((), prefetch),
+            Content::Triangles(index) => self.blocks.get(index).map_or((), prefetch),
+            Content::Spheres(_) | Content::Item(_) => {}
+        }
+    }
+
     /// Bytes held.
     pub(super) fn bytes(&self) -> u64 {
         let bytes = self.nodes.len() * size_of::<Node>()

@@ -157,6 +157,7 @@ impl Packet {
                 while bits != 0 {
                     let lane = bits.trailing_zeros() as usize & 7;
                     bits &= bits - 1;
+                    tree.prefetch(node.children[lane]);
                     let slot = (index * WIDTH + lane) as u64;
                     stack.push(u64::from(near[lane].to_bits()) << 32 | slot);
                 }

@@ -113,7 +113,7 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
                 let node = &tree.nodes[index];
                 let (bits, enter) = slabs.meets::<S, ROBUST>(simd, &node.planes, t_far);
                 if bits != 0 {
-                    current = nearest(&mut stack, node, bits, enter);
+                    current = nearest(tree, &mut stack, node, bits, enter);
                     continue 'visit;
                 }
             }
@@ -163,6 +163,7 @@ pub(super) fn ask<S: Simd>(simd: S, items: impl Items, item: u32, ray: &Ray, bes
 /// Puts all children that are hit on the stack, the nearest last, but for that one, which it returns.
 #[inline(always)]
 fn nearest<F: Floats<Array = [f32; 8]>>(
+    tree: &Tree,
     stack: &mut Stack<STACK>,
     node: &Node,
     bits: u32,
@@ -179,6 +180,7 @@ fn nearest<F: Floats<Array = [f32; 8]>>(
     let a = entry(enter[first], node.children[first]);
     let b = entry(enter[second], node.children[second]);
     let (mut near, far) = (a.min(b), a.max(b));
+    tree.prefetch(child_of(far));
     if bits == 0 {
         stack.push(far);
         return child_of(near);
@@ -189,6 +191,7 @@ fn nearest<F: Floats<Array = [f32; 8]>>(
         let lane = bits.trailing_zeros() as usize & 7;
         bits &= bits - 1;
         let next = entry(enter[lane], node.children[lane]);
+        tree.prefetch(node.children[lane]);
         stack.push(near.max(next));
         near = near.min(next);
     }
@@ -239,7 +242,9 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
                     current = node.children[bits.trailing_zeros() as usize & 7];
                     bits &= bits - 1;
                     while bits != 0 {
-                        stack.push(node.children[bits.trailing_zeros() as usize & 7].0.into());
+                        let child = node.children[bits.trailing_zeros() as usize & 7];
+                        tree.prefetch(child);
+                        stack.push(child.0.into());
                         bits &= bits - 1;
                     }
                     continue;
