@@ -49,6 +49,8 @@ pub mod material;
 pub mod math;
 pub mod measure;
 pub mod medium;
+#[path = "embree/pages.rs"]
+mod pages;
 pub mod render;
 pub mod sampler;
 pub mod scene;

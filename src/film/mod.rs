@@ -16,6 +16,7 @@ pub use picture::Picture;
 use rayon::prelude::*;
 
 use crate::color::Rgb;
+use crate::pages::prefer_large;
 use crate::sampler::REPLICATES;
 
 /// A rectangle of pixels: `x0 ≤ x < x1`, `y0 ≤ y < y1`, y down.
@@ -86,7 +87,12 @@ impl Film {
     /// A black film; with a plane for errors where `with_error`.
     pub fn new(size: [u32; 2], window: PixelRect, with_error: bool) -> Self {
         // On all threads: most of the time goes into asking the system for the memory.
-        let plane = || rayon::iter::repeat_n(Rgb::BLACK, window.area()).collect();
+        let plane = || {
+            let mut plane = Vec::with_capacity(window.area());
+            prefer_large(&mut plane);
+            plane.par_extend(rayon::iter::repeat_n(Rgb::BLACK, window.area()));
+            plane
+        };
         Self {
             size,
             window,

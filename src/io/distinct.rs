@@ -3,6 +3,8 @@
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
 
+use crate::pages::prefer_large;
+
 /// A set of keys, each with its number.
 ///
 /// A table of u32 beside the list of keys: 12 bytes a key and 6 to 12 for the table, where
@@ -23,7 +25,9 @@ impl Distinct {
         let state = RandomState::new();
         let seeds = [0, 1, 2].map(|k: u8| state.hash_one(k) | 1);
         let slots = (capacity + capacity / 2).next_power_of_two().max(64);
-        Self { keys: Vec::with_capacity(capacity), table: vec![FREE; slots], seeds }
+        let mut keys = Vec::with_capacity(capacity);
+        prefer_large(&mut keys);
+        Self { keys, table: table(slots), seeds }
     }
 
     /// The number of `key`, a new one if it was not seen before.
@@ -64,7 +68,7 @@ impl Distinct {
     }
 
     fn grow(&mut self) {
-        self.table = vec![FREE; 2 * self.table.len()];
+        self.table = table(2 * self.table.len());
         let mask = self.table.len() - 1;
         for (i, &key) in self.keys.iter().enumerate() {
             let mut slot = self.slot(key);
@@ -74,6 +78,14 @@ impl Distinct {
             self.table[slot] = i as u32;
         }
     }
+}
+
+/// An empty table: every look at it goes somewhere else.
+fn table(slots: usize) -> Vec<u32> {
+    let mut table = Vec::with_capacity(slots);
+    prefer_large(&mut table);
+    table.resize(slots, FREE);
+    table
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use super::error::ReadError;
 use super::{obj, ply, stl};
 use crate::geometry::{Positions, TriangleMesh};
 use crate::math::Bounds;
+use crate::pages::prefer_large;
 
 /// A mesh as read, with what the user should know about it.
 #[derive(Clone, Debug)]
@@ -120,6 +121,7 @@ pub(super) fn check_count(path: &Path, n: u64, what: &str) -> Result<(), ReadErr
 pub(super) fn zeroed_positions(n: usize) -> Vec<f32> {
     // Zeroed memory from the system is touched first by the threads that fill it.
     let mut xyz = vec![0.0; 3 * n + 1];
+    prefer_large(&mut xyz);
     xyz.truncate(3 * n);
     xyz
 }

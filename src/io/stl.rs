@@ -14,6 +14,7 @@ use super::error::ReadError;
 use super::memory::check_memory;
 use super::mesh::{Draft, MeshFile, check_count, zeroed_positions};
 use super::source::Source;
+use crate::pages::prefer_large;
 
 /// Bytes in front of the triangles of a binary file: 80 of comment and the number of triangles.
 const HEADER: u64 = 84;
@@ -70,6 +71,7 @@ fn read_binary(source: &Source, count: u64) -> Result<Draft, ReadError> {
     check_count(source.path, count, "triangles")?;
     let n = count as usize;
     let mut triangles = vec![[0_u32; 3]; n];
+    prefer_large(&mut triangles);
     // A closed mesh has half as many vertices as triangles.
     let mut vertices = Distinct::with_capacity(n / 2 + 16);
     let chunks = n.div_ceil(PER_CHUNK);

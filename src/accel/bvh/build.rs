@@ -12,6 +12,7 @@ use super::super::AccelError;
 use super::node::{Child, Node, SphereBlock, Tree, TriangleBlock, WIDTH};
 use super::watch::Watch;
 use crate::geometry::Sphere;
+use crate::pages::prefer_large;
 
 /// Below so many levels of nodes, boxes are split in halves of equal number: coordinates that grow
 /// geometrically would make a tree as deep as they are many.
@@ -196,9 +197,16 @@ pub(super) fn build(
         let ids = ids(leaf);
         SphereBlock::new(leaf.len as usize, ids.map(|id| primitives.sphere(id)), ids)
     };
-    let blocks = leaves.par_iter().with_min_len(512).map(triangles).collect();
+    let mut blocks = Vec::with_capacity(leaves.len());
+    prefer_large(&mut blocks);
+    blocks.par_extend(leaves.par_iter().with_min_len(512).map(triangles));
     let spheres = balls.par_iter().with_min_len(512).map(spheres).collect();
-    Ok(Tree { nodes, blocks, spheres, endless })
+    // To where the pages are large; they have come here bit by bit.
+    drop(refs);
+    let mut moved = Vec::with_capacity(nodes.len());
+    prefer_large(&mut moved);
+    moved.par_extend(nodes);
+    Ok(Tree { nodes: moved, blocks, spheres, endless })
 }
 
 impl<'a> Part<'a> {

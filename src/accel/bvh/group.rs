@@ -12,6 +12,7 @@ use super::traverse::{Found, Items, any, closest};
 use super::watch::Watch;
 use crate::geometry::{AnalyticShape, Shapes, Sphere, with_shapes};
 use crate::math::{Bounds, Ray};
+use crate::pages::prefer_large;
 
 /// A group and the tree over it. Primitives are numbered through all its geometries; items are shapes,
 /// numbered in the same way (spheres among them, though few are: most stand in blocks), and then copies.
@@ -63,6 +64,7 @@ impl GroupTree {
         watch.reserve(expected as u64)?;
 
         let mut refs = Vec::with_capacity(primitives + copies.len());
+        prefer_large(&mut refs);
         let mut endless = Vec::new();
         let mut add = |kind: Kind, id: u32, item: u32, bounds: &Bounds| {
             if bounds.is_empty() {

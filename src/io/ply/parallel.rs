@@ -10,6 +10,7 @@ use crate::io::error::ReadError;
 use crate::io::mesh::{include, to_relative, zeroed_positions};
 use crate::io::source::{CHUNK, Source};
 use crate::math::Bounds;
+use crate::pages::prefer_large;
 
 /// The offset and type of a number in a record.
 type Slot = (usize, Scalar);
@@ -161,6 +162,7 @@ pub(super) fn triangles<const BIG: bool>(
     let is_common = count_type == Scalar::U8 && index_type.size() == 4;
 
     let mut triangles = vec![[0_u32; 3]; n];
+    prefer_large(&mut triangles);
     let stop = triangles
         .par_chunks_mut(per_chunk)
         .enumerate()
