@@ -163,7 +163,7 @@ pub(super) fn build(
     watch: &Watch,
 ) -> Result<Tree, AccelError> {
     if refs.is_empty() {
-        return Ok(Tree { endless, ..Tree::default() });
+        return Ok(Tree::new(Vec::new(), Vec::new(), Vec::new(), endless));
     }
     let refs_bytes = size_of_val(&refs[..]) as u64;
     let whole = Part::new(&mut refs, 0);
@@ -206,7 +206,7 @@ pub(super) fn build(
     let mut moved = Vec::with_capacity(nodes.len());
     prefer_large(&mut moved);
     moved.par_extend(nodes);
-    Ok(Tree { nodes: moved, blocks, spheres, endless })
+    Ok(Tree::new(moved, blocks, spheres, endless))
 }
 
 impl<'a> Part<'a> {

@@ -121,12 +121,31 @@ pub(super) struct Tree {
     pub(super) spheres: Vec<SphereBlock>,
     /// Items without end, which every ray is tested against.
     pub(super) endless: Vec<u32>,
+    /// Whether it is more than caches hold.
+    is_large: bool,
 }
 
 impl Tree {
-    /// Has the processor bring a child that will be visited.
+    /// Bytes from which on it takes a while to bring a node.
+    const LARGE: u64 = 1 << 20;
+
+    pub(super) fn new(
+        nodes: Vec<Node>,
+        blocks: Vec<TriangleBlock>,
+        spheres: Vec<SphereBlock>,
+        endless: Vec<u32>,
+    ) -> Self {
+        let tree = Self { nodes, blocks, spheres, endless, is_large: false };
+        Self { is_large: tree.bytes() >= Self::LARGE, ..tree }
+    }
+
+    /// Has the processor bring a child that will be visited, unless the tree is so small that all of it is at
+    /// hand.
     #[inline(always)]
     pub(super) fn prefetch(&self, child: Child) {
+        if !self.is_large {
+            return;
+        }
         match child.content() {
             Content::Node(index) => self.nodes.get(index).map_or((), prefetch),
             Content::Triangles(index) => self.blocks.get(index).map_or((), prefetch),
