@@ -137,7 +137,7 @@ fn are_alike(a: &[[f32; 3]], b: &[[f32; 3]]) -> bool {
 fn check(materials: &[&str], expected: Variant, seed: u64) {
     let mut random = Random(seed);
     let mut met = 0;
-    for round in 0..if common::verify() { 400 } else { 20 } {
+    for round in 0..if common::verify() { 400 } else { 60 } {
         let (text, wall) = (random_scene(&mut random, materials), wall(&mut random));
         for &kind in AccelKind::ALL {
             let scene = build(&text, &wall, kind);
