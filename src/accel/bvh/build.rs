@@ -175,7 +175,9 @@ pub(super) fn build(
         + size_of_val(&balls[..])
         + leaves.len() * size_of::<TriangleBlock>()
         + balls.len() * size_of::<SphereBlock>();
-    watch.reserve(refs_bytes + bytes as u64)?;
+    // Nodes move once more, when the references are gone.
+    let beside = refs_bytes.max(size_of_val(&nodes[..]) as u64);
+    watch.reserve(beside + bytes as u64)?;
     // Places that are left over repeat the last.
     let ids = |leaf: &Leaf| -> [u32; WIDTH] {
         let refs = &refs[leaf.start as usize..][..leaf.len as usize];
