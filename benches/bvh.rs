@@ -59,7 +59,7 @@ fn blobs() -> Scene {
 /// Rows of other crates beside ours, as `alhazen bench` measures them, with one thread.
 #[cfg(feature = "crates")]
 fn crates(scene: &Scene) {
-    use alhazen::measure::bench::{BenchOptions, RayKind, StructureKind, bench, total};
+    use alhazen::measure::bench::{BenchOptions, RayKind, Row, StructureKind, bench, total};
 
     let structures = StructureKind::all();
     let is_wanted = |kind: &StructureKind| !["bsp", "octree", "brute"].contains(&kind.name());
@@ -72,12 +72,20 @@ fn crates(scene: &Scene) {
     };
     let report = bench(scene, &options, &()).expect("a sound scene");
     println!(
-        "single rays of accelerators and crates, robust where they know it, of Embree; wrong hits:"
+        "accelerators and crates, robust where they know it, of Embree's single rays, and ours by a crate's with its \
+         target; wrong hits:"
     );
+    let ratio_of = |row: &Row, kind| row.speeds.iter().find(|s| s.kind == kind).map(|s| s.ratio);
+    let ours = report.rows.iter().find(|row| row.name == "bvh").expect("it is always measured");
     for row in report.rows.iter().filter(|row| row.not_measured.is_none()) {
+        let is_crate = row.name.starts_with("obvhs") || row.name.starts_with("crate");
         let ratio = |kind: RayKind| {
-            let speed = row.speeds.iter().find(|s| s.kind == kind);
-            speed.map_or_else(String::new, |s| format!("{} {:.2}  ", kind.name(), s.ratio))
+            let Some(ratio) = ratio_of(row, kind) else { return String::new() };
+            let by_it = ratio_of(ours, kind).filter(|_| is_crate);
+            let by_it = by_it.map_or_else(String::new, |ours| {
+                format!(" (ours {:.1} of it; target 1)", ours / ratio)
+            });
+            format!("{} {ratio:.2}{by_it}  ", kind.name())
         };
         let wrong = total(&row.against_f64);
         println!(

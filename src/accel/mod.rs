@@ -219,8 +219,8 @@ pub struct BuildOptions {
     pub precision: Precision,
     /// How much work.
     pub quality: BuildQuality,
-    /// Rays that will be traced, which [`BuildQuality::Auto`] goes by: those that run close together count half,
-    /// as they take half the time. Many where not given.
+    /// Rays that will be traced and hit something, which [`BuildQuality::Auto`] goes by: those that run close
+    /// together count a twelfth, as a worse hierarchy hardly slows them. Many where not given.
     pub expected_rays: Option<u64>,
     /// Threads of the build; all where not given.
     pub threads: Option<usize>,
@@ -317,31 +317,44 @@ pub(crate) use with_accel;
 /// Triangles of a mesh from which on it matters how it is built.
 const LARGE: u64 = 1 << 17;
 
-/// So many rays for each triangle take as much longer as [`BuildQuality::Low`] saves: 3 to more than 16, by the mesh.
-/// Between them, to build too well and too quickly cost about as much.
+/// So many rays for each triangle take as much longer as [`BuildQuality::Low`] saves: those without order 1.3 to 3.5,
+/// those that run close together 13 and more, by the mesh.
 // Measured by `cargo bench --bench limits`.
-const FEW_RAYS: u64 = 9;
+const FEW_RAYS: f64 = 2.4;
 
 impl BuildOptions {
     /// The quality that a group of the world is built with: [`BuildQuality::Auto`], decided. Embree takes low
     /// for a group of one large mesh by itself, where few rays are expected for so many triangles. Over more
     /// than that, it would not come out the same on any number of threads. Our own hierarchy gains nothing.
     pub fn quality_of(&self, world: &World, group: &Group) -> BuildQuality {
+        match self.quality {
+            BuildQuality::Auto if self.is_low(world, group, self.expected_rays) => {
+                BuildQuality::Low
+            }
+            BuildQuality::Auto => BuildQuality::Medium,
+            quality => quality,
+        }
+    }
+
+    /// Whether that would be another, were fewer rays expected.
+    pub fn rays_decide(&self, world: &World, group: &Group) -> bool {
+        self.expected_rays.is_some()
+            && self.quality_of(world, group) == BuildQuality::Medium
+            && self.quality == BuildQuality::Auto
+            && self.is_low(world, group, Some(0))
+    }
+
+    /// Whether [`BuildQuality::Auto`] is low where so many rays are expected.
+    fn is_low(&self, world: &World, group: &Group, rays: Option<u64>) -> bool {
         #[cfg(feature = "embree")]
         let gains = self.built_kind() == AccelKind::Embree && !self.compact;
         #[cfg(not(feature = "embree"))]
         let gains = false;
-        let few = |triangles: u64| self.expected_rays.is_some_and(|n| n < FEW_RAYS * triangles);
         let is_alone = world.sets.is_empty() || !std::ptr::eq(group, &world.root);
-        match (self.quality, group.geometries.as_slice()) {
-            (BuildQuality::Auto, [Geometry::Mesh(mesh)]) if gains && is_alone => {
-                let triangles = mesh.triangles.len() as u64;
-                let is_low = triangles >= LARGE && few(triangles);
-                if is_low { BuildQuality::Low } else { BuildQuality::Medium }
-            }
-            (BuildQuality::Auto, _) => BuildQuality::Medium,
-            (quality, _) => quality,
-        }
+        let [Geometry::Mesh(mesh)] = group.geometries.as_slice() else { return false };
+        let triangles = mesh.triangles.len() as u64;
+        let is_few = rays.is_some_and(|n| (n as f64) < FEW_RAYS * triangles as f64);
+        gains && is_alone && triangles >= LARGE && is_few
     }
 
     /// The structure that is built: Embree's loses some rays that meet a vertex, so that

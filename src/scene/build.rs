@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3};
 
+use super::coverage::coverage;
 use super::desc::{
     CameraDesc, IntegratorKind, LensDesc, Location, PlaceDesc, Reference, RenderSettings,
     SceneDesc, Tolerance,
@@ -21,7 +22,7 @@ use super::surface::SurfacePoint;
 use super::tessellate::{Tessellation, tessellate};
 use super::volumes::{check_volumes, placed_volumes};
 use crate::accel::{
-    Accel, AccelError, AccelKind, BuildOptions, BuildQuality, Hit, MemoryEstimate, World,
+    Accel, AccelError, AccelKind, BuildOptions, BuildQuality, Geometry, Hit, MemoryEstimate, World,
 };
 use crate::camera::{Camera, Lens, Pose, Projection};
 use crate::color::Rgb;
@@ -450,6 +451,13 @@ impl Scene {
                 .or_else(|| Some(requirements.expected_rays(size, &desc.settings))),
             ..options.clone()
         };
+        if let [Geometry::Mesh(mesh)] = world.root.geometries.as_slice()
+            && options.rays_decide(&world, &world.root)
+        {
+            // The fewer there are, the more of the picture is empty.
+            let share = coverage(mesh, &camera, size);
+            options.expected_rays = options.expected_rays.map(|n| (n as f64 * share) as u64);
+        }
         let memory_estimate =
             options.fit(&world, desc.settings.compact).map_err(|e| vec![e.into()])?;
         let accel = Accel::build(&world, &options, progress).map_err(|e| vec![e.into()])?;

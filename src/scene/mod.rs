@@ -6,6 +6,7 @@
 //! lines. It does not know how light travels.
 
 mod build;
+mod coverage;
 mod desc;
 mod draft;
 mod hollow;

@@ -199,29 +199,30 @@ impl Requirements {
         r
     }
 
-    /// About how many rays a picture of `size` takes with all its samples, for [`BuildOptions::expected_rays`]:
-    /// those that run close together count half.
+    /// About how many rays a picture of `size` takes with all its samples, if every camera ray hits something, for
+    /// [`BuildOptions::expected_rays`]: those that run close together count a twelfth.
     ///
     /// [`BuildOptions::expected_rays`]: crate::accel::BuildOptions::expected_rays
     pub fn expected_rays(&self, size: [u32; 2], settings: &RenderSettings) -> u64 {
-        // Four rays that count whole; how many it really is, is known when they are traced.
-        const OF_A_TREE: u64 = 8;
+        const WHOLE: u64 = 12;
+        // How many it really is, is known when they are traced.
+        const OF_A_TREE: u64 = 4 * WHOLE;
         let points =
             self.lecture_lights + self.point_lights + self.directional_lights + self.spot_lights;
         let surfaces = self.area_lights * u64::from(settings.shadow_samples);
         let shadow = match (self.shadow_rays, self.picks_lights) {
             (false, _) => 0,
-            (true, true) => 2 * u64::from(settings.light_samples),
-            (true, false) => points + 2 * surfaces,
+            (true, true) => WHOLE * u64::from(settings.light_samples),
+            (true, false) => points + WHOLE * surfaces,
         };
-        let halves = match settings.integrator {
+        let of_a_sample = match settings.integrator {
             IntegratorKind::Flat => 1,
-            IntegratorKind::Ao => 3,
-            IntegratorKind::Whitted if self.variant != Variant::Local => OF_A_TREE * (1 + shadow),
+            IntegratorKind::Ao => 1 + WHOLE,
+            IntegratorKind::Whitted if self.variant != Variant::Local => OF_A_TREE + 4 * shadow,
             IntegratorKind::Whitted | IntegratorKind::Direct => 1 + shadow,
         };
         let samples = u64::from(size[0]) * u64::from(size[1]);
-        samples.saturating_mul(settings.samples.into()).saturating_mul(halves) / 2
+        samples.saturating_mul(settings.samples.into()).saturating_mul(of_a_sample) / WHOLE
     }
 
     /// The least variant that knows of all there is.

@@ -145,6 +145,8 @@ struct Subtree {
     leaves: Vec<Leaf>,
     /// Of spheres.
     balls: Vec<Leaf>,
+    /// Whether there are leaves of items.
+    has_items: bool,
 }
 
 /// Where the primitives of a leaf are among all.
@@ -163,12 +165,12 @@ pub(super) fn build(
     watch: &Watch,
 ) -> Result<Tree, AccelError> {
     if refs.is_empty() {
-        return Ok(Tree::new(Vec::new(), Vec::new(), Vec::new(), endless));
+        return Ok(Tree::new(Vec::new(), Vec::new(), Vec::new(), endless, false));
     }
     let refs_bytes = size_of_val(&refs[..]) as u64;
     let whole = Part::new(&mut refs, 0);
     let builder = Builder { bins: bins.clamp(4, BINS), watch };
-    let Subtree { nodes, leaves, balls } = builder.subtree(whole, 0);
+    let Subtree { nodes, leaves, balls, has_items } = builder.subtree(whole, 0);
     watch.check()?;
     let bytes = size_of_val(&nodes[..])
         + size_of_val(&leaves[..])
@@ -208,7 +210,7 @@ pub(super) fn build(
     let mut moved = Vec::with_capacity(nodes.len());
     prefer_large(&mut moved);
     moved.par_extend(nodes);
-    Ok(Tree::new(moved, blocks, spheres, endless))
+    Ok(Tree::new(moved, blocks, spheres, endless, has_items))
 }
 
 impl<'a> Part<'a> {
@@ -299,7 +301,10 @@ impl Builder<'_> {
         let first = part.refs[0];
         let leaf = Leaf { start: part.start as u32, len: part.refs.len() as u32 };
         match first.kind() {
-            Kind::Item => Child::item(first.id()),
+            Kind::Item => {
+                tree.has_items = true;
+                Child::item(first.id())
+            }
             Kind::Triangle => {
                 tree.leaves.push(leaf);
                 Child::triangles(tree.leaves.len() - 1)
@@ -430,6 +435,7 @@ impl Subtree {
         self.nodes.append(&mut other.nodes);
         self.leaves.append(&mut other.leaves);
         self.balls.append(&mut other.balls);
+        self.has_items |= other.has_items;
     }
 }
 

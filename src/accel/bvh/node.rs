@@ -1,6 +1,6 @@
 //! How the tree lies in memory.
 
-use super::simd::prefetch;
+use super::simd::{place, prefetch};
 use crate::geometry::Sphere;
 
 /// Children of a node, triangles or spheres of a leaf.
@@ -121,6 +121,8 @@ pub(super) struct Tree {
     pub(super) spheres: Vec<SphereBlock>,
     /// Items without end, which every ray is tested against.
     pub(super) endless: Vec<u32>,
+    /// Whether all leaves are blocks of triangles.
+    pub(super) is_of_triangles: bool,
     /// Whether it is more than caches hold.
     is_large: bool,
 }
@@ -129,13 +131,16 @@ impl Tree {
     /// Bytes from which on it takes a while to bring a node.
     const LARGE: u64 = 1 << 20;
 
+    /// With `has_items`, there are leaves of them.
     pub(super) fn new(
         nodes: Vec<Node>,
         blocks: Vec<TriangleBlock>,
         spheres: Vec<SphereBlock>,
         endless: Vec<u32>,
+        has_items: bool,
     ) -> Self {
-        let tree = Self { nodes, blocks, spheres, endless, is_large: false };
+        let is_of_triangles = spheres.is_empty() && !has_items;
+        let tree = Self { nodes, blocks, spheres, endless, is_of_triangles, is_large: false };
         Self { is_large: tree.bytes() >= Self::LARGE, ..tree }
     }
 
@@ -146,11 +151,13 @@ impl Tree {
         if !self.is_large {
             return;
         }
-        match child.content() {
-            Content::Node(index) => self.nodes.get(index).map_or((), prefetch),
-            Content::Triangles(index) => self.blocks.get(index).map_or((), prefetch),
-            Content::Spheres(_) | Content::Item(_) => {}
-        }
+        // Without branches: what is asked for next is told apart when it is visited. For the few children that are
+        // neither node nor triangles some node is brought, or none.
+        let index = (child.0 & Child::INDEX) as usize;
+        let of_nodes = place(&self.nodes, index);
+        let of_blocks = place(&self.blocks, index);
+        let is_block = child.0 & Child::TRIANGLES != 0;
+        prefetch(std::hint::select_unpredictable(is_block, of_blocks, of_nodes));
     }
 
     /// Bytes held.

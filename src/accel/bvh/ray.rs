@@ -1,5 +1,9 @@
 //! What a ray brings along to boxes and triangles, worked out once.
 
+use std::hint::select_unpredictable;
+
+use glam::Vec4;
+
 use super::simd::{Floats, Simd};
 use crate::math::Ray;
 
@@ -29,6 +33,9 @@ const MARGIN: f32 = 4.0 * f32::EPSILON;
 /// The largest reciprocal.
 const HUGE: f32 = f32::MAX / 4.0;
 
+/// The largest where slabs are not exact.
+const MOST: f32 = 1e24;
+
 impl RaySetup {
     /// No ray.
     pub(super) const NOTHING: Self = Self {
@@ -42,14 +49,6 @@ impl RaySetup {
         shear: [0.0; 3],
     };
 
-    /// None where nothing can be hit: a number is not finite, the direction is zero, the ray has no length.
-    #[inline(always)]
-    pub(super) fn new<const ROBUST: bool>(ray: &Ray) -> Option<Self> {
-        let (o, d) = (ray.origin.to_array(), ray.direction.to_array());
-        let (setup, is_ray) = Self::of::<ROBUST>(o, d, [ray.t_min, ray.t_max]);
-        is_ray.then_some(setup)
-    }
-
     /// Whether anything can be hit, and if so, with what. Without branches, so that the compiler makes a
     /// loop over several rays one over lanes.
     #[inline(always)]
@@ -59,12 +58,13 @@ impl RaySetup {
         [t_min, t_max]: [f32; 2],
     ) -> (Self, bool) {
         // Zero times a finite number is zero; any other is NaN.
-        let sum = (o[0] + o[1] + o[2] + d[0] + d[1] + d[2]) * 0.0;
+        let sum = [0, 1, 2].map(|axis| o[axis] * 0.0 + d[axis] * 0.0);
         let t_max = if t_max < f32::MAX { t_max } else { f32::MAX };
         let size = d.map(f32::abs);
         let longest = if size[0] > size[1] { size[0] } else { size[1] };
         let longest = if longest > size[2] { longest } else { size[2] };
-        let is_ray = (sum == 0.0) & (longest > 0.0) & (t_min < t_max);
+        let is_finite = (sum[0] == 0.0) & (sum[1] == 0.0) & (sum[2] == 0.0);
+        let is_ray = is_finite & (longest > 0.0) & (t_min < t_max);
 
         let last = if size[0] == longest { 0 } else { 1 + u32::from(size[1] != longest) };
         let along = 1.0 / turned(d, last)[2];
@@ -90,23 +90,80 @@ impl RaySetup {
         setup.shear = [x * along, y * along, along];
         (setup, is_ray)
     }
-
-    /// Which plane of a slab is entered first, by axis: 0 the lower, 1 the upper.
-    #[inline(always)]
-    pub(super) fn sign(&self) -> [usize; 3] {
-        self.near.map(|r| usize::from(r < 0.0))
-    }
 }
 
 /// What belongs to the axes, that of `last` last: 0, 1, 2 or 1, 2, 0 or 2, 0, 1.
 #[inline(always)]
 pub(super) fn turned<T: Copy>([x, y, z]: [T; 3], last: u32) -> [T; 3] {
-    if last == 0 {
-        [y, z, x]
-    } else if last == 1 {
-        [z, x, y]
-    } else {
-        [x, y, z]
+    // The axis differs from ray to ray, so that branches would go wrong.
+    let of = |first, second, third| {
+        select_unpredictable(last == 0, first, select_unpredictable(last == 1, second, third))
+    };
+    [of(y, z, x), of(z, x, y), of(x, y, z)]
+}
+
+/// One ray, against boxes and against what is in leaves.
+pub(super) struct LoneRay<F> {
+    pub(super) slabs: SlabRay<F>,
+    pub(super) shear: ShearRay<F>,
+    /// Finite.
+    pub(super) t_max: f32,
+}
+
+impl<F: Floats<Array = [f32; 8]>> LoneRay<F> {
+    /// None where nothing can be hit: a number is not finite, the direction is zero, the ray has no length.
+    ///
+    /// The numbers are those of [`RaySetup::of`], which lays out many rays side by side; here it is the three axes that
+    /// are.
+    #[inline(always)]
+    pub(super) fn new<S: Simd<F8 = F>, const ROBUST: bool>(simd: S, ray: &Ray) -> Option<Self> {
+        let (o, d) = (ray.origin.extend(0.0), ray.direction.extend(0.0));
+        let t_max = if ray.t_max < f32::MAX { ray.t_max } else { f32::MAX };
+        let size = d.abs();
+        let longest = size.max_element();
+        let is_finite = (o * 0.0 + d * 0.0).cmpeq(Vec4::ZERO).all();
+        if !(is_finite && longest > 0.0 && ray.t_min < t_max) {
+            return None;
+        }
+        let is_along = size.cmplt(Vec4::splat(longest * 1e-18));
+        let r = d.recip();
+        let is_huge = is_along | r.abs().cmpgt(Vec4::splat(HUGE));
+        let r = Vec4::select(is_huge, Vec4::splat(HUGE).copysign(d), r);
+        let sides = if ROBUST {
+            let least = 1e-24 / if longest < 1.0 { longest } else { 1.0 };
+            let shift = (o.abs() * f32::EPSILON).max(Vec4::splat(least)).copysign(d);
+            let far_origin = Vec4::select(is_along, o - shift, o);
+            [[o, r * (1.0 - MARGIN)], [far_origin, r * (1.0 + MARGIN)]]
+        } else {
+            // Where a product is huge its rounding is too, and the slab is widened by it.
+            let most = Vec4::splat(MOST);
+            let r = r.max(-most).min(most);
+            let product = -o * r;
+            let wider = product.abs() * f32::EPSILON + 1e15;
+            let wider = Vec4::select(r.abs().cmpeq(most), wider, Vec4::ZERO);
+            [[product - wider, r], [product + wider, r]]
+        };
+        let splat = |v: Vec4| [v.x, v.y, v.z].map(|x| simd.splat8(x));
+        let upper = sides[0][1].cmplt(Vec4::ZERO).bitmask() as usize;
+        let t_min = ray.t_min + 0.0;
+        let slabs = SlabRay {
+            origins: sides.map(|[origin, _]| splat(origin)),
+            reciprocals: sides.map(|[_, reciprocal]| splat(reciprocal)),
+            t_min: simd.splat8(t_min),
+            sign: [upper & 1, upper >> 1 & 1, upper >> 2 & 1],
+        };
+        let last = size.cmpeq(Vec4::splat(longest)).bitmask().trailing_zeros();
+        let [first, second, third] = turned([0, 1, 2], last);
+        let (o, d) = (ray.origin.to_array(), ray.direction.to_array());
+        let along = 1.0 / d[third];
+        let shear = ShearRay {
+            origin: [first, second, third].map(|axis| simd.splat8(o[axis])),
+            shear: [simd.splat8(d[first] * along), simd.splat8(d[second] * along)],
+            axes: [first, second, third],
+            along,
+            t_min,
+        };
+        Some(Self { slabs, shear, t_max })
     }
 }
 
@@ -122,30 +179,6 @@ pub(super) struct SlabRay<F> {
 }
 
 impl<F: Floats> SlabRay<F> {
-    #[inline(always)]
-    pub(super) fn new<S: Simd<F8 = F>, const ROBUST: bool>(simd: S, ray: &RaySetup) -> Self {
-        let splat = |[x, y, z]: [f32; 3]| [simd.splat8(x), simd.splat8(y), simd.splat8(z)];
-        let mut origins = [ray.origin, ray.far_origin];
-        let mut reciprocals = [ray.near, ray.far];
-        if !ROBUST {
-            // Where a product is huge its rounding is too, and the slab is widened by it.
-            const MOST: f32 = 1e24;
-            for axis in 0..3 {
-                let r = ray.near[axis].clamp(-MOST, MOST);
-                let product = -ray.origin[axis] * r;
-                let wider = if r.abs() == MOST { product.abs() * f32::EPSILON + 1e15 } else { 0.0 };
-                (origins[0][axis], origins[1][axis]) = (product - wider, product + wider);
-                (reciprocals[0][axis], reciprocals[1][axis]) = (r, r);
-            }
-        }
-        Self {
-            origins: [splat(origins[0]), splat(origins[1])],
-            reciprocals: [splat(reciprocals[0]), splat(reciprocals[1])],
-            t_min: simd.splat8(ray.t_min),
-            sign: ray.sign(),
-        }
-    }
-
     /// In which boxes the ray is somewhere before `t_max`, as bits, and where it enters them.
     #[inline(always)]
     pub(super) fn meets<S: Simd<F8 = F>, const ROBUST: bool>(
@@ -198,11 +231,6 @@ pub(super) struct ShearRay<F> {
 }
 
 impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
-    #[inline(always)]
-    pub(super) fn new<S: Simd<F8 = F>>(simd: S, ray: &RaySetup) -> Self {
-        Self::of(simd, ray.origin, ray.shear, ray.last, ray.t_min)
-    }
-
     /// By the parts of a [`RaySetup`].
     #[inline(always)]
     pub(super) fn of<S: Simd<F8 = F>>(
@@ -232,5 +260,99 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
     #[inline(always)]
     pub(super) fn sheared(&self, [x, y, z]: [F; 3]) -> [F; 3] {
         [self.shear[0].neg_mul_add(z, x), self.shear[1].neg_mul_add(z, y), z]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::super::simd::Portable;
+    use super::*;
+
+    fn check<const ROBUST: bool>(ray: &Ray) -> bool {
+        let (o, d) = (ray.origin.to_array(), ray.direction.to_array());
+        let (setup, is_ray) = RaySetup::of::<ROBUST>(o, d, [ray.t_min, ray.t_max]);
+        let lone = LoneRay::new::<_, ROBUST>(Portable, ray);
+        assert_eq!(lone.is_some(), is_ray, "{ray:?}");
+        let Some(LoneRay { slabs, shear, t_max }) = lone else { return false };
+        let bits = |lanes: &[f32]| lanes.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        let first = |lanes: [<Portable as Simd>::F8; 3]| lanes.map(|f| f.to_array()[0]);
+        let same = |a: &[f32], b: &[f32]| assert_eq!(bits(a), bits(b), "{ray:?}: {a:?} and {b:?}");
+        if ROBUST {
+            same(&first(slabs.origins[0]), &setup.origin);
+            same(&first(slabs.origins[1]), &setup.far_origin);
+            same(&first(slabs.reciprocals[0]), &setup.near);
+            same(&first(slabs.reciprocals[1]), &setup.far);
+        } else {
+            let clamped = setup.near.map(|r| r.clamp(-MOST, MOST));
+            for reciprocals in slabs.reciprocals {
+                same(&first(reciprocals), &clamped);
+            }
+            for axis in 0..3 {
+                let product = -o[axis] * clamped[axis];
+                let [enter, exit] = slabs.origins.map(|origin| first(origin)[axis]);
+                // No scene is as large.
+                if o[axis].abs() > 1e13 {
+                    continue;
+                }
+                assert!(enter <= product && product <= exit, "{ray:?}");
+                assert_eq!(enter < exit, clamped[axis].abs() == MOST, "{ray:?}");
+            }
+        }
+        assert_eq!(slabs.sign, setup.near.map(|r| usize::from(r < 0.0)));
+        let turns = ShearRay::of(Portable, setup.origin, setup.shear, setup.last, setup.t_min);
+        assert_eq!(shear.axes, turns.axes);
+        same(&first(shear.origin), &first(turns.origin));
+        same(&shear.shear.map(|f| f.to_array()[0]), &turns.shear.map(|f| f.to_array()[0]));
+        same(&[shear.along, shear.t_min, t_max], &[turns.along, turns.t_min, setup.t_max]);
+        same(&[slabs.t_min.to_array()[0]], &[setup.t_min]);
+        true
+    }
+
+    /// A ray by itself and one among many are the same, whatever numbers they have.
+    #[test]
+    fn a_lone_ray_is_set_up_as_one_of_many() {
+        let special = [
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            0.5,
+            1e-44,
+            -1e-40,
+            1e-30,
+            1e-20,
+            3e-19,
+            -7e-18,
+            1e-6,
+            1e9,
+            -1e20,
+            3e38,
+            f32::MIN_POSITIVE,
+            f32::MAX,
+            f32::INFINITY,
+            f32::NAN,
+        ];
+        let mut state = 1u32;
+        let mut next = |n: usize| {
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            (state >> 9) as usize % n
+        };
+        let mut rays = 0;
+        for round in 0..200_000 {
+            let mut number = || match (round % 3, next(4)) {
+                (0, _) | (1, 0) => special[next(special.len())],
+                (1, _) => special[next(15)],
+                _ => next(1 << 20) as f32 / (1 << 19) as f32 - 1.0,
+            };
+            let [origin, direction] = [(); 2].map(|()| Vec3::new(number(), number(), number()));
+            let [t_min, t_max] = [(); 2].map(|()| number().abs());
+            let ray = Ray { t_min, t_max, ..Ray::new(origin, direction) };
+            let is_ray = check::<true>(&ray);
+            assert_eq!(is_ray, check::<false>(&ray));
+            rays += u32::from(is_ray);
+        }
+        assert!((40_000..160_000).contains(&rays), "{rays}");
     }
 }

@@ -29,6 +29,8 @@ pub(super) trait Floats: Copy {
     fn sqrt(self) -> Self;
     /// In which lanes `self ≤ b`, as bits; not in those with NaN.
     fn le(self, b: Self) -> u32;
+    /// In which lanes `self < b`, likewise.
+    fn lt(self, b: Self) -> u32;
 }
 
 /// An instruction set.
@@ -174,6 +176,11 @@ impl<const N: usize> Floats for Lanes<N> {
     fn le(self, b: Self) -> u32 {
         (0..N).fold(0, |bits, i| bits | u32::from(self.0[i] <= b.0[i]) << i)
     }
+
+    #[inline(always)]
+    fn lt(self, b: Self) -> u32 {
+        (0..N).fold(0, |bits, i| bits | u32::from(self.0[i] < b.0[i]) << i)
+    }
 }
 
 impl Simd for Portable {
@@ -273,6 +280,11 @@ impl<F: Floats<Array = [f32; 8]>> Floats for Pair<F> {
     fn le(self, b: Self) -> u32 {
         self.0.le(b.0) | self.1.le(b.1) << 8
     }
+
+    #[inline(always)]
+    fn lt(self, b: Self) -> u32 {
+        self.0.lt(b.0) | self.1.lt(b.1) << 8
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -318,7 +330,7 @@ mod x86 {
     macro_rules! lanes {
         ($name:ident($register:ty) of $n:literal, $proof:literal: $store:ident, $add:ident, $sub:ident,
          $mul:ident, $div:ident, $mul_add:ident, $mul_sub:ident, $neg_mul_add:ident, $min:ident, $max:ident,
-         $sqrt:ident, |$a:ident, $b:ident| $le:expr) => {
+         $sqrt:ident, |$a:ident, $b:ident| $le:expr, $lt:expr) => {
             #[doc = concat!("Lanes of ", $proof, ", made by its methods alone.")]
             #[derive(Debug, Clone, Copy)]
             pub(in super::super) struct $name($register);
@@ -349,6 +361,13 @@ mod x86 {
                     // SAFETY: `self` proves the instruction set.
                     unsafe { $le }
                 }
+
+                #[inline(always)]
+                fn lt(self, b: Self) -> u32 {
+                    let ($a, $b) = (self.0, b.0);
+                    // SAFETY: `self` proves the instruction set.
+                    unsafe { $lt }
+                }
             }
         };
         (@binary $($name:ident $op:ident),*) => {$(
@@ -369,11 +388,13 @@ mod x86 {
 
     lanes!(Avx8(__m256) of 8, "[`Avx2`]": _mm256_storeu_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps,
         _mm256_div_ps, _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_fnmadd_ps, _mm256_min_ps, _mm256_max_ps,
-        _mm256_sqrt_ps, |a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32);
+        _mm256_sqrt_ps, |a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32,
+        _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) as u32);
 
     lanes!(Avx16(__m512) of 16, "[`Avx512`]": _mm512_storeu_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps,
         _mm512_div_ps, _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_min_ps, _mm512_max_ps,
-        _mm512_sqrt_ps, |a, b| u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)));
+        _mm512_sqrt_ps, |a, b| u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)),
+        u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b)));
 
     impl Simd for Avx2 {
         type F8 = Avx8;
@@ -455,19 +476,28 @@ mod x86 {
     }
 }
 
-/// Has the processor bring all of a value to its first cache, while something else goes on.
+/// An address that is asked for, not read.
+pub(super) type Place = *const i8;
+
+/// Where a value of a slice lies, if it is there.
 #[inline(always)]
-pub(super) fn prefetch<T>(value: &T) {
+pub(super) const fn place<T>(values: &[T], index: usize) -> Place {
+    values.as_ptr().wrapping_add(index).cast()
+}
+
+/// Has the processor bring the 256 bytes from an address on to its first cache, while something else goes on.
+#[inline(always)]
+pub(super) fn prefetch(address: Place) {
     #[cfg(target_arch = "x86_64")]
-    for line in (0..size_of::<T>()).step_by(64) {
+    for line in (0..256).step_by(64) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let address = std::ptr::from_ref(value).cast::<i8>().wrapping_add(line);
+        let address = address.wrapping_add(line);
         // SAFETY: every x86-64 processor has the instruction, which reads nothing that a program could see and
         // does not fault, whatever the address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(address) };
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = value;
+    let _ = address;
 }
 
 /// A stack of numbers that costs nothing to make.

@@ -48,9 +48,11 @@ fn check<F: Floats<Array = [f32; N]>, const N: usize>(load: impl Fn(&[f32; N]) -
         let le = (0..N).fold(0, |bits, i| bits | u32::from(a[i] <= b[i]) << i);
         assert_eq!(x.le(y), le);
         assert_eq!(x.le(x), (1 << N) - 1);
+        assert_eq!(x.lt(y), (0..N).fold(0, |bits, i| bits | u32::from(a[i] < b[i]) << i));
+        assert_eq!(x.lt(x), 0);
     }
     let nan = load(&[f32::NAN; N]);
-    assert_eq!(nan.le(nan), 0);
+    assert_eq!((nan.le(nan), nan.lt(nan)), (0, 0));
 }
 
 fn check_isa(simd: impl Simd) {

@@ -2,7 +2,7 @@
 
 use super::build::MAX_DEPTH;
 use super::node::{Child, Content, Node, Tree, WIDTH};
-use super::ray::{RaySetup, ShearRay, SlabRay};
+use super::ray::LoneRay;
 use super::simd::{Floats, Simd, Stack};
 use super::triangle::TriangleHit;
 use crate::accel::Hit;
@@ -94,16 +94,29 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
     items: impl Items,
     ray: &Ray,
 ) -> Option<Found> {
-    let setup = RaySetup::new::<ROBUST>(ray)?;
-    let mut best = Found::nothing(setup.t_max);
+    if tree.is_of_triangles {
+        closest_in::<S, ROBUST, true>(simd, tree, items, ray)
+    } else {
+        closest_in::<S, ROBUST, false>(simd, tree, items, ray)
+    }
+}
+
+/// `TRIANGLES`: there is nothing else. The compiler would work out for every ray what spheres ask of it.
+#[inline(always)]
+fn closest_in<S: Simd, const ROBUST: bool, const TRIANGLES: bool>(
+    simd: S,
+    tree: &Tree,
+    items: impl Items,
+    ray: &Ray,
+) -> Option<Found> {
+    let LoneRay { slabs, shear, t_max } = LoneRay::new::<S, ROBUST>(simd, ray)?;
+    let mut best = Found::nothing(t_max);
     for &item in &tree.endless {
         ask(simd, items, item, ray, &mut best);
     }
     if tree.nodes.is_empty() {
         return best.if_any();
     }
-    let slabs = SlabRay::new::<S, ROBUST>(simd, &setup);
-    let shear = ShearRay::new(simd, &setup);
     let mut stack = Stack::<STACK>::new();
     let mut current = Child::node(0);
     let mut t_far = simd.splat8(best.t);
@@ -129,14 +142,15 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
                 });
                 t_far = simd.splat8(best.t);
             }
-            Content::Spheres(index) => {
+            Content::Spheres(index) if !TRIANGLES => {
                 shear.closest_sphere(simd, &tree.spheres[index], ray, &mut best);
                 t_far = simd.splat8(best.t);
             }
-            Content::Item(item) => {
+            Content::Item(item) if !TRIANGLES => {
                 ask(simd, items, item, ray, &mut best);
                 t_far = simd.splat8(best.t);
             }
+            Content::Spheres(_) | Content::Item(_) => {}
         }
         loop {
             let Some(entry) = stack.pop() else { break 'visit };
@@ -221,16 +235,30 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
     items: impl Items,
     ray: &Ray,
 ) -> bool {
-    let Some(setup) = RaySetup::new::<ROBUST>(ray) else { return false };
+    if tree.is_of_triangles {
+        any_in::<S, ROBUST, OPAQUE, true>(simd, tree, items, ray)
+    } else {
+        any_in::<S, ROBUST, OPAQUE, false>(simd, tree, items, ray)
+    }
+}
+
+#[inline(always)]
+fn any_in<S: Simd, const ROBUST: bool, const OPAQUE: bool, const TRIANGLES: bool>(
+    simd: S,
+    tree: &Tree,
+    items: impl Items,
+    ray: &Ray,
+) -> bool {
+    let Some(LoneRay { slabs, shear, t_max }) = LoneRay::new::<S, ROBUST>(simd, ray) else {
+        return false;
+    };
     if tree.endless.iter().any(|&item| items.occluded::<S, OPAQUE>(simd, item, ray)) {
         return true;
     }
     if tree.nodes.is_empty() {
         return false;
     }
-    let slabs = SlabRay::new::<S, ROBUST>(simd, &setup);
-    let shear = ShearRay::new(simd, &setup);
-    let t_far = simd.splat8(setup.t_max);
+    let t_far = simd.splat8(t_max);
     let mut stack = Stack::<STACK>::new();
     let mut current = Child::node(0);
     loop {
@@ -253,7 +281,7 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
             Content::Triangles(index) => {
                 let block = &tree.blocks[index];
                 let mut is_hit = false;
-                shear.each_hit::<S, ROBUST>(simd, block, setup.t_max, |lane, _| {
+                shear.each_hit::<S, ROBUST>(simd, block, t_max, |lane, _| {
                     is_hit = !(OPAQUE && items.is_clear(block.ids[lane]));
                     is_hit
                 });
@@ -261,17 +289,18 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
                     return true;
                 }
             }
-            Content::Spheres(index) => {
+            Content::Spheres(index) if !TRIANGLES => {
                 let counts = |id| !(OPAQUE && items.is_clear(id));
                 if shear.meets_sphere(simd, &tree.spheres[index], ray, counts) {
                     return true;
                 }
             }
-            Content::Item(item) => {
+            Content::Item(item) if !TRIANGLES => {
                 if items.occluded::<S, OPAQUE>(simd, item, ray) {
                     return true;
                 }
             }
+            Content::Spheres(_) | Content::Item(_) => {}
         }
         match stack.pop() {
             Some(entry) => current = child_of(entry),

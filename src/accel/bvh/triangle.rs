@@ -71,6 +71,12 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
         let [az, bz, cz] = sheared[2];
         let inverse = simd.splat8(1.0).div(sum);
         let t = u.mul_add(az, v.mul_add(bz, w.mul(cz))).mul(inverse).mul(simd.splat8(self.along));
+        // What is not a number stays: it is asked again.
+        let is_outside = t.le(simd.splat8(self.t_min)) | simd.splat8(t_max).lt(t);
+        bits &= !is_outside;
+        if bits == 0 {
+            return;
+        }
         let (us, vs) = (v.mul(inverse).to_array(), w.mul(inverse).to_array());
         let (ts, sums) = (t.to_array(), sum.to_array());
         while bits != 0 {
