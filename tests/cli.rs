@@ -348,7 +348,12 @@ fn auto_builds_a_large_mesh_quickly_for_few_rays() {
     let few = ["--size", "640x480", "--samples", "1"];
     let low = if cfg!(feature = "embree") { "low" } else { "medium" };
     assert_eq!(quality(&few), low);
-    assert_eq!(quality(&["--size", "640x480", "--samples", "8"]), "medium");
+    assert_eq!(quality(&["--size", "640x480", "--samples", "256"]), "medium");
+    // Rays that run close together hardly suffer.
+    assert_eq!(quality(&["--size", "640x480", "--samples", "8"]), low);
+    let ao = ["--size", "640x480", "--integrator", "ao", "--samples"];
+    assert_eq!(quality(&[&ao[..], &["1"]].concat()), low);
+    assert_eq!(quality(&[&ao[..], &["8"]].concat()), "medium");
     for more in [["--accel", "bvh"], ["--precision", "exact"], ["--build-quality", "medium"]] {
         assert_eq!(quality(&[&few[..], &more].concat()), "medium");
     }
