@@ -339,12 +339,13 @@ fn a_memory_limit_is_an_error_not_a_crash() {
 fn auto_builds_a_large_mesh_quickly_for_few_rays() {
     let folder = tempfile::tempdir().unwrap();
     run(folder.path(), &["generate", "terrain", "-n", "150k", "-o", "t.ply", "-q"]);
-    let quality = |more: &[&str]| {
-        let all: Vec<&str> = ["inspect", "t.ply"].iter().chain(more).copied().collect();
+    let quality_of = |scene: &str, more: &[&str]| {
+        let all: Vec<&str> = ["inspect", scene].iter().chain(more).copied().collect();
         let text = run(folder.path(), &all);
         let (_, rest) = text.split_once(", quality ").unwrap_or_else(|| panic!("{text}"));
         rest.split(';').next().unwrap_or_default().to_owned()
     };
+    let quality = |more: &[&str]| quality_of("t.ply", more);
     let few = ["--size", "640x480", "--samples", "1"];
     let low = if cfg!(feature = "embree") { "low" } else { "medium" };
     assert_eq!(quality(&few), low);
@@ -354,6 +355,10 @@ fn auto_builds_a_large_mesh_quickly_for_few_rays() {
     let ao = ["--size", "640x480", "--integrator", "ao", "--samples"];
     assert_eq!(quality(&[&ao[..], &["1"]].concat()), low);
     assert_eq!(quality(&[&ao[..], &["8"]].concat()), "medium");
+    // Nor do rays that miss it.
+    let far = "[camera]\neye = [0, 0, 900]\ntarget = [0, 0, 0]\nfov = 40\n[[objects]]\nmesh = \"t.ply\"\n";
+    std::fs::write(folder.path().join("far.toml"), far).unwrap();
+    assert_eq!(quality_of("far.toml", &[&ao[..], &["8"]].concat()), low);
     for more in [["--accel", "bvh"], ["--precision", "exact"], ["--build-quality", "medium"]] {
         assert_eq!(quality(&[&few[..], &more].concat()), "medium");
     }
