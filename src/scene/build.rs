@@ -446,17 +446,17 @@ impl Scene {
         let mut options = BuildOptions {
             precision: desc.settings.precision,
             quality: desc.settings.build_quality,
-            expected_rays: options
-                .expected_rays
-                .or_else(|| Some(requirements.expected_rays(size, &desc.settings))),
             ..options.clone()
         };
-        if let [Geometry::Mesh(mesh)] = world.root.geometries.as_slice()
-            && options.rays_decide(&world, &world.root)
-        {
-            // The fewer there are, the more of the picture is empty.
-            let share = coverage(mesh, &camera, size);
-            options.expected_rays = options.expected_rays.map(|n| (n as f64 * share) as u64);
+        if options.expected_rays.is_none() {
+            let rays = requirements.expected_rays(size, &desc.settings);
+            options.expected_rays = Some(rays);
+            if let [Geometry::Mesh(mesh)] = world.root.geometries.as_slice()
+                && options.rays_decide(&world, &world.root)
+            {
+                let share = coverage(mesh, &camera, size);
+                options.expected_rays = Some((rays as f64 * share) as u64);
+            }
         }
         let memory_estimate =
             options.fit(&world, desc.settings.compact).map_err(|e| vec![e.into()])?;

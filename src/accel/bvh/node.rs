@@ -156,7 +156,7 @@ impl Tree {
         let index = (child.0 & Child::INDEX) as usize;
         let of_nodes = place(&self.nodes, index);
         let of_blocks = place(&self.blocks, index);
-        let is_block = child.0 & Child::TRIANGLES != 0;
+        let is_block = child.0 & Child::SPHERES == Child::TRIANGLES;
         prefetch(std::hint::select_unpredictable(is_block, of_blocks, of_nodes));
     }
 
