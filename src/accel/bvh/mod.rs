@@ -242,7 +242,7 @@ impl<const ROBUST: bool> Kernel for ClosestOfBlock<'_, ROBUST> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> HitBlock {
         let Self { accel, rays } = self;
-        let Some(mut packet) = Packet::new::<ROBUST>(rays) else {
+        let Some(mut packet) = Packet::new::<S, ROBUST>(simd, rays) else {
             return HitBlock::from_fn(rays.active(), |lane| {
                 let ray = &rays.get(lane);
                 simd.run(Closest::<ROBUST> { accel, ray }).map(|found| accel.hit(&found))
@@ -266,7 +266,7 @@ impl<const ROBUST: bool, const OPAQUE: bool> Kernel for AnyOfBlock<'_, ROBUST, O
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u16 {
         let Self { accel, rays } = self;
-        let Some(mut packet) = Packet::new::<ROBUST>(rays) else {
+        let Some(mut packet) = Packet::new::<S, ROBUST>(simd, rays) else {
             return rays
                 .lanes()
                 .filter(|lane| {

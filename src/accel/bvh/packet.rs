@@ -35,7 +35,7 @@ impl Packet {
     /// None where signs differ.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
-    pub(super) fn new<const ROBUST: bool>(block: &RayBlock) -> Option<Self> {
+    pub(super) fn new<S: Simd, const ROBUST: bool>(simd: S, block: &RayBlock) -> Option<Self> {
         const NOTHING: [f32; LANES] = [0.0; LANES];
         let mut packet = Self {
             active: 0,
@@ -81,21 +81,24 @@ impl Packet {
             packet.t_min[lane] = packet.t_min[first];
             packet.t_max[lane] = f32::NEG_INFINITY;
         }
-        packet.least_t = least(&packet.t_min);
+        packet.least_t = simd.load16(&packet.t_min).least();
         for axis in 0..3 {
-            let (near, far) = (&packet.near[axis], &packet.far[axis]);
-            let (origin, far_origin) = (&packet.origin[axis], &packet.far_origin[axis]);
-            let (low, high) = (least(near), most(near));
+            let near = simd.load16(&packet.near[axis]);
+            let (low, high) = (near.least(), near.greatest());
             if low < 0.0 && high >= 0.0 {
                 return None;
             }
             packet.sign[axis] = usize::from(low < 0.0);
+            let (origin, far_origin) =
+                (simd.load16(&packet.origin[axis]), simd.load16(&packet.far_origin[axis]));
             let ends = if packet.sign[axis] == 0 {
-                [most(origin), least(far_origin)]
+                [origin.greatest(), far_origin.least()]
             } else {
-                [least(origin), most(far_origin)]
+                [origin.least(), far_origin.greatest()]
             };
-            packet.intervals[axis] = [[ends[0], low, high], [ends[1], least(far), most(far)]];
+            let far = simd.load16(&packet.far[axis]);
+            packet.intervals[axis] =
+                [[ends[0], low, high], [ends[1], far.least(), far.greatest()]];
         }
         Some(packet)
     }
@@ -108,21 +111,15 @@ impl Packet {
         ShearRay::of(simd, origin, shear, self.last[lane], self.t_min[lane])
     }
 
-    /// The furthest that any ray goes.
-    #[inline(always)]
-    fn furthest(&self) -> f32 {
-        most(&self.t_max)
-    }
-
-    /// Calls `visit` for each leaf that rays meet, the nearest first, with their lanes, until it returns
-    /// false.
+    /// Calls `visit` for each leaf that rays meet, the nearest first, with their lanes and how far each ray
+    /// looks; where it changed that, it returns true. Ends where none looks for anything any more.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
     fn traverse<S: Simd>(
-        &mut self,
+        &self,
         simd: S,
         tree: &Tree,
-        mut visit: impl FnMut(&mut Self, Content, u16) -> bool,
+        mut visit: impl FnMut(Content, u16, &mut S::F16) -> bool,
     ) {
         if tree.nodes.is_empty() || self.active == 0 {
             return;
@@ -137,7 +134,9 @@ impl Packet {
         }
         let least_t = simd.splat8(self.least_t);
         let sign = self.sign;
-        let mut furthest = self.furthest();
+        // In a register, not in memory: what is written by lane cannot be read at once side by side.
+        let mut t_max = simd.load16(&self.t_max);
+        let mut furthest = t_max.greatest();
         let mut stack = Stack::<STACK>::new();
         let mut index = 0;
         loop {
@@ -172,17 +171,19 @@ impl Packet {
                 let (parent, lane) = ((entry as u32) as usize / WIDTH, entry as usize % WIDTH);
                 let node = &tree.nodes[parent];
                 let content = node.children[lane].content();
-                let lanes = self.lanes_that_meet(simd, node, lane);
+                let lanes = self.lanes_that_meet(simd, node, lane, t_max);
                 if lanes == 0 {
                     continue;
                 }
                 if let Content::Node(index) = content {
                     break index;
                 }
-                if !visit(self, content, lanes) {
-                    return;
+                if visit(content, lanes, &mut t_max) {
+                    furthest = t_max.greatest();
+                    if furthest == f32::NEG_INFINITY {
+                        return;
+                    }
                 }
-                furthest = self.furthest();
             };
         }
     }
@@ -201,44 +202,36 @@ impl Packet {
         times
     }
 
-    /// The rays that meet the box of a child.
+    /// The rays that meet the box of a child before `t_max`.
     #[inline(always)]
-    fn lanes_that_meet<S: Simd>(&self, simd: S, node: &Node, child: usize) -> u16 {
+    fn lanes_that_meet<S: Simd>(&self, simd: S, node: &Node, child: usize, t_max: S::F16) -> u16 {
         let near = self.lane_times(simd, node, child, 0);
         let far = self.lane_times(simd, node, child, 1);
         let enter = near[0].max(near[1]).max(near[2].max(simd.load16(&self.t_min)));
-        let exit = far[0].min(far[1]).min(far[2].min(simd.load16(&self.t_max)));
+        let exit = far[0].min(far[1]).min(far[2].min(t_max));
         enter.le(exit) as u16
     }
-}
-
-/// The least of the lanes, in halves, as the compiler makes lanes of it.
-#[inline(always)]
-fn least(values: &[f32; LANES]) -> f32 {
-    let mut v = *values;
-    for half in [8, 4, 2, 1] {
-        for i in 0..half {
-            v[i] = if v[i] < v[i + half] { v[i] } else { v[i + half] };
-        }
-    }
-    v[0]
-}
-
-/// The greatest of them.
-#[inline(always)]
-fn most(values: &[f32; LANES]) -> f32 {
-    let mut v = *values;
-    for half in [8, 4, 2, 1] {
-        for i in 0..half {
-            v[i] = if v[i] > v[i + half] { v[i] } else { v[i + half] };
-        }
-    }
-    v[0]
 }
 
 /// The closest hit of each ray, as [`super::traverse::closest`] finds it.
 #[inline(always)]
 pub(super) fn closest<S: Simd, const ROBUST: bool>(
+    simd: S,
+    tree: &Tree,
+    items: impl Items,
+    block: &RayBlock,
+    packet: &mut Packet,
+) -> [Found; LANES] {
+    if tree.is_of_triangles {
+        closest_in::<S, ROBUST, true>(simd, tree, items, block, packet)
+    } else {
+        closest_in::<S, ROBUST, false>(simd, tree, items, block, packet)
+    }
+}
+
+/// `TRIANGLES`: there is nothing else.
+#[inline(always)]
+fn closest_in<S: Simd, const ROBUST: bool, const TRIANGLES: bool>(
     simd: S,
     tree: &Tree,
     items: impl Items,
@@ -253,16 +246,17 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
         }
         packet.t_max[lane] = best[lane].t;
     }
-    packet.traverse(simd, tree, |packet, content, lanes| {
+    packet.traverse(simd, tree, |content, lanes, t_max| {
+        let mut is_changed = false;
         for lane in lanes_of(lanes) {
             let lane = lane % LANES;
             let best = &mut best[lane];
+            let before = best.t;
             match content {
-                Content::Node(_) => {}
                 Content::Triangles(index) => {
                     let triangles = &tree.blocks[index];
                     let ray = packet.shear_ray(simd, lane);
-                    ray.each_hit::<S, ROBUST>(simd, triangles, best.t, |i, hit| {
+                    ray.each_hit::<S, ROBUST>(simd, triangles, before, |i, hit| {
                         let found = Found::triangle(hit, triangles.ids[i]);
                         if found.is_before(best) {
                             *best = found;
@@ -270,15 +264,21 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
                         false
                     });
                 }
-                Content::Spheres(index) => {
+                Content::Spheres(index) if !TRIANGLES => {
                     let shear = packet.shear_ray(simd, lane);
                     shear.closest_sphere(simd, &tree.spheres[index], &block.get(lane), best);
                 }
-                Content::Item(item) => ask(simd, items, item, &block.get(lane), best),
+                Content::Item(item) if !TRIANGLES => {
+                    ask(simd, items, item, &block.get(lane), best);
+                }
+                Content::Node(_) | Content::Spheres(_) | Content::Item(_) => {}
             }
-            packet.t_max[lane] = best.t;
+            if best.t < before {
+                *t_max = t_max.choose(1 << lane, simd.splat16(best.t));
+                is_changed = true;
+            }
         }
-        true
+        is_changed
     });
     best
 }
@@ -292,8 +292,23 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
     block: &RayBlock,
     packet: &mut Packet,
 ) -> u16 {
+    if tree.is_of_triangles {
+        any_in::<S, ROBUST, OPAQUE, true>(simd, tree, items, block, packet)
+    } else {
+        any_in::<S, ROBUST, OPAQUE, false>(simd, tree, items, block, packet)
+    }
+}
+
+#[inline(always)]
+fn any_in<S: Simd, const ROBUST: bool, const OPAQUE: bool, const TRIANGLES: bool>(
+    simd: S,
+    tree: &Tree,
+    items: impl Items,
+    block: &RayBlock,
+    packet: &mut Packet,
+) -> u16 {
     let mut occluded = 0;
-    for lane in lanes_of(packet.active) {
+    for lane in lanes_of(packet.active).filter(|_| !tree.endless.is_empty()) {
         let ray = block.get(lane);
         if tree.endless.iter().any(|&item| items.occluded::<S, OPAQUE>(simd, item, &ray)) {
             occluded |= 1 << lane;
@@ -303,12 +318,12 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
     if occluded == packet.active {
         return occluded;
     }
-    packet.traverse(simd, tree, |packet, content, lanes| {
+    packet.traverse(simd, tree, |content, lanes, t_max| {
+        let mut hits = 0;
         for lane in lanes_of(lanes) {
             let lane = lane % LANES;
             let mut is_hit = false;
             match content {
-                Content::Node(_) => {}
                 Content::Triangles(index) => {
                     let triangles = &tree.blocks[index];
                     let ray = packet.shear_ray(simd, lane);
@@ -317,21 +332,21 @@ pub(super) fn any<S: Simd, const ROBUST: bool, const OPAQUE: bool>(
                         is_hit
                     });
                 }
-                Content::Spheres(index) => {
+                Content::Spheres(index) if !TRIANGLES => {
                     let counts = |id| !(OPAQUE && items.is_clear(id));
                     let (shear, spheres) = (packet.shear_ray(simd, lane), &tree.spheres[index]);
                     is_hit = shear.meets_sphere(simd, spheres, &block.get(lane), counts);
                 }
-                Content::Item(item) => {
+                Content::Item(item) if !TRIANGLES => {
                     is_hit = items.occluded::<S, OPAQUE>(simd, item, &block.get(lane));
                 }
+                Content::Node(_) | Content::Spheres(_) | Content::Item(_) => {}
             }
-            if is_hit {
-                occluded |= 1 << lane;
-                packet.t_max[lane] = f32::NEG_INFINITY;
-            }
+            hits |= u16::from(is_hit) << lane;
         }
-        occluded != packet.active
+        occluded |= hits;
+        *t_max = t_max.choose(hits.into(), simd.splat16(f32::NEG_INFINITY));
+        hits != 0
     });
     occluded
 }

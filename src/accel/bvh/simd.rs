@@ -31,6 +31,12 @@ pub(super) trait Floats: Copy {
     fn le(self, b: Self) -> u32;
     /// In which lanes `self < b`, likewise.
     fn lt(self, b: Self) -> u32;
+    /// `b` in the lanes whose bits are set, `self` in the others.
+    fn choose(self, bits: u32, b: Self) -> Self;
+    /// The least of the lanes, none of which may be NaN.
+    fn least(self) -> f32;
+    /// The greatest, likewise.
+    fn greatest(self) -> f32;
 }
 
 /// An instruction set.
@@ -181,6 +187,21 @@ impl<const N: usize> Floats for Lanes<N> {
     fn lt(self, b: Self) -> u32 {
         (0..N).fold(0, |bits, i| bits | u32::from(self.0[i] < b.0[i]) << i)
     }
+
+    #[inline(always)]
+    fn choose(self, bits: u32, b: Self) -> Self {
+        Self(std::array::from_fn(|i| if bits >> i & 1 == 1 { b.0[i] } else { self.0[i] }))
+    }
+
+    #[inline(always)]
+    fn least(self) -> f32 {
+        self.0.into_iter().fold(f32::INFINITY, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        self.0.into_iter().fold(f32::NEG_INFINITY, |a, b| if a > b { a } else { b })
+    }
 }
 
 impl Simd for Portable {
@@ -285,6 +306,21 @@ impl<F: Floats<Array = [f32; 8]>> Floats for Pair<F> {
     fn lt(self, b: Self) -> u32 {
         self.0.lt(b.0) | self.1.lt(b.1) << 8
     }
+
+    #[inline(always)]
+    fn choose(self, bits: u32, b: Self) -> Self {
+        Self(self.0.choose(bits, b.0), self.1.choose(bits >> 8, b.1))
+    }
+
+    #[inline(always)]
+    fn least(self) -> f32 {
+        self.0.min(self.1).least()
+    }
+
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        self.0.max(self.1).greatest()
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -330,7 +366,8 @@ mod x86 {
     macro_rules! lanes {
         ($name:ident($register:ty) of $n:literal, $proof:literal: $store:ident, $add:ident, $sub:ident,
          $mul:ident, $div:ident, $mul_add:ident, $mul_sub:ident, $neg_mul_add:ident, $min:ident, $max:ident,
-         $sqrt:ident, |$a:ident, $b:ident| $le:expr, $lt:expr) => {
+         $sqrt:ident, |$a:ident, $b:ident| $le:expr, $lt:expr, |$bits:ident| $choose:expr,
+         |$lanes:ident| $least:expr, $greatest:expr) => {
             #[doc = concat!("Lanes of ", $proof, ", made by its methods alone.")]
             #[derive(Debug, Clone, Copy)]
             pub(in super::super) struct $name($register);
@@ -368,6 +405,27 @@ mod x86 {
                     // SAFETY: `self` proves the instruction set.
                     unsafe { $lt }
                 }
+
+                #[inline(always)]
+                fn choose(self, $bits: u32, b: Self) -> Self {
+                    let ($a, $b) = (self.0, b.0);
+                    // SAFETY: `self` proves the instruction set.
+                    Self(unsafe { $choose })
+                }
+
+                #[inline(always)]
+                fn least(self) -> f32 {
+                    let $lanes = self.0;
+                    // SAFETY: `self` proves the instruction set.
+                    unsafe { $least }
+                }
+
+                #[inline(always)]
+                fn greatest(self) -> f32 {
+                    let $lanes = self.0;
+                    // SAFETY: `self` proves the instruction set.
+                    unsafe { $greatest }
+                }
             }
         };
         (@binary $($name:ident $op:ident),*) => {$(
@@ -386,15 +444,42 @@ mod x86 {
         )*};
     }
 
+    /// What is left of all lanes by an operation on two at a time.
+    macro_rules! across {
+        (halves($v:ident): $of_eight:ident, $of_four:ident) => {{
+            let high = _mm256_castpd_ps(_mm512_extractf64x4_pd::<1>(_mm512_castps_pd($v)));
+            let both = $of_eight(_mm512_castps512_ps256($v), high);
+            across!(both: $of_four)
+        }};
+        ($v:ident: $of_four:ident) => {{
+            let four = $of_four(_mm256_castps256_ps128($v), _mm256_extractf128_ps::<1>($v));
+            let two = $of_four(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32($of_four(two, _mm_movehdup_ps(two)))
+        }};
+    }
+
+    /// All bits of the lanes whose bits are set.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn lane_mask(bits: u32) -> __m256 {
+        let each = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+        let of_lane = _mm256_and_si256(_mm256_set1_epi32(bits as i32), each);
+        _mm256_castsi256_ps(_mm256_cmpeq_epi32(of_lane, each))
+    }
+
     lanes!(Avx8(__m256) of 8, "[`Avx2`]": _mm256_storeu_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps,
         _mm256_div_ps, _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_fnmadd_ps, _mm256_min_ps, _mm256_max_ps,
         _mm256_sqrt_ps, |a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32,
-        _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) as u32);
+        _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) as u32,
+        |bits| _mm256_blendv_ps(a, b, lane_mask(bits)),
+        |v| across!(v: _mm_min_ps), across!(v: _mm_max_ps));
 
     lanes!(Avx16(__m512) of 16, "[`Avx512`]": _mm512_storeu_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps,
         _mm512_div_ps, _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_min_ps, _mm512_max_ps,
         _mm512_sqrt_ps, |a, b| u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)),
-        u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b)));
+        u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b)),
+        |bits| _mm512_mask_blend_ps(bits as u16, a, b),
+        |v| across!(halves(v): _mm256_min_ps, _mm_min_ps), across!(halves(v): _mm256_max_ps, _mm_max_ps));
 
     impl Simd for Avx2 {
         type F8 = Avx8;

@@ -77,20 +77,32 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
         if bits == 0 {
             return;
         }
+        let is_inside = |t: f32| t > self.t_min && t <= t_max;
+        let zero = simd.splat8(0.0);
+        let mut unclear = if ROBUST { bits & zero.le(sum) & sum.le(zero) } else { 0 };
+        if unclear != 0 {
+            // Apart from the others: for those nothing has to be written to memory.
+            bits &= !unclear;
+            let sheared = sheared.map(|axis| axis.map(F::to_array));
+            while unclear != 0 {
+                let lane = unclear.trailing_zeros() as usize & 7;
+                unclear &= unclear - 1;
+                let corners = sheared.map(|axis| axis.map(|lanes| lanes[lane]));
+                if let Some(hit) = exact_hit(&corners, self.along)
+                    && is_inside(hit.t)
+                    && found(lane, hit)
+                {
+                    return;
+                }
+            }
+        }
         let (us, vs) = (v.mul(inverse).to_array(), w.mul(inverse).to_array());
-        let (ts, sums) = (t.to_array(), sum.to_array());
+        let ts = t.to_array();
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize & 7;
             bits &= bits - 1;
-            let mut hit = TriangleHit { t: ts[lane], u: us[lane], v: vs[lane] };
-            if ROBUST && sums[lane] == 0.0 {
-                let lanes = sheared.map(|axis| axis.map(|f| f.to_array()[lane]));
-                match exact_hit(&lanes, self.along) {
-                    Some(exact) => hit = exact,
-                    None => continue,
-                }
-            }
-            if hit.t > self.t_min && hit.t <= t_max && found(lane, hit) {
+            let hit = TriangleHit { t: ts[lane], u: us[lane], v: vs[lane] };
+            if is_inside(hit.t) && found(lane, hit) {
                 return;
             }
         }
