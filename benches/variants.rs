@@ -8,7 +8,7 @@
 mod common;
 
 use alhazen::accel::{Accel, LANES, RayBlock, RayQuery};
-use alhazen::color::Rgb;
+use alhazen::color::{Rgb, RgbLanes};
 use alhazen::film::Film;
 use alhazen::integrator::{CameraBlock, Integrator, Local, RayCounts, Whitted};
 use alhazen::render::{RenderJob, render};
@@ -89,14 +89,14 @@ fn shaded<Q: RayQuery>(
     query: &Q,
     integrator: &impl Integrator,
     blocks: &[(RayBlock, [Sampler; LANES])],
-) -> Vec<[[u32; 3]; LANES]> {
+) -> Vec<[[u32; LANES]; 3]> {
     let block = |(rays, samplers): &(RayBlock, [Sampler; LANES])| {
         let hits = query.intersect_block(rays);
         let camera = CameraBlock { rays, hits: &hits, samplers };
         let mut counts = RayCounts::default();
         let radiance = integrator.shade(scene, query, &camera, &mut counts);
         std::hint::black_box(counts);
-        radiance.map(|c| c.to_array().map(f32::to_bits))
+        radiance.0.map(|values| values.map(f32::to_bits))
     };
     blocks.par_iter().with_min_len(16).map(block).collect()
 }
@@ -112,9 +112,9 @@ impl Integrator for Minimal {
         query: &Q,
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
-    ) -> [Rgb; LANES] {
+    ) -> RgbLanes<LANES> {
         let points: [_; LANES] = std::array::from_fn(|lane| {
-            camera.hits.get(lane).map(|hit| scene.surface(&camera.rays.get(lane), hit))
+            camera.hits.get(lane).map(|hit| scene.surface(&camera.rays.get(lane), &hit))
         });
         let mut radiance = points.each_ref().map(|point| match point {
             Some(point) => point.material.ambient() * scene.ambient,
@@ -148,6 +148,6 @@ impl Integrator for Minimal {
                 radiance[lane] += unshadowed[lane];
             }
         }
-        radiance
+        RgbLanes::from_fn(|lane| radiance[lane])
     }
 }

@@ -252,7 +252,7 @@ fn blocks_that_differ(kind: AccelKind) -> usize {
                 assert_eq!(occluded >> lane & 1 == 1, alone.is_some(), "seed {seed}");
                 if let (Some(a), Some(b)) = (alone, hit) {
                     assert!((a.t - b.t).abs() <= tolerance(&ray, &a), "seed {seed}: {a:?} {b:?}");
-                    different += usize::from(who(&a) != who(b));
+                    different += usize::from(who(&a) != who(&b));
                 }
             }
         }

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::Hit;
+use super::world::CopyRef;
 use crate::math::Ray;
 
 /// Rays of a block.
@@ -98,32 +99,165 @@ pub(crate) fn lanes_where(flags: &[bool; LANES]) -> u16 {
     (0..LANES).fold(0, |bits, lane| bits | u16::from(flags[lane]) << lane)
 }
 
-/// The hits of a block.
+/// The hits of a block: the fields of [`Hit`], a lane each.
 #[derive(Debug, Clone)]
+#[repr(C, align(64))]
 pub struct HitBlock {
-    hits: [Option<Hit>; LANES],
+    t: [f32; LANES],
+    u: [f32; LANES],
+    v: [f32; LANES],
+    primitive: [u32; LANES],
+    geometry: [u32; LANES],
+    copy: [CopyRef; LANES],
+    lanes: u16,
+    /// Those of them that hit a copy.
+    copies: u16,
 }
 
 impl HitBlock {
+    /// No hit.
+    pub const NONE: Self = Self {
+        t: [0.0; LANES],
+        u: [0.0; LANES],
+        v: [0.0; LANES],
+        primitive: [0; LANES],
+        geometry: [0; LANES],
+        copy: [CopyRef { set: 0, index: 0 }; LANES],
+        lanes: 0,
+        copies: 0,
+    };
+
     /// Asks `hit` for each lane in `active`.
     #[inline]
     pub fn from_fn(active: u16, mut hit: impl FnMut(usize) -> Option<Hit>) -> Self {
-        Self {
-            hits: std::array::from_fn(
-                |lane| if active >> lane & 1 == 1 { hit(lane) } else { None },
-            ),
+        let mut hits = Self::NONE;
+        for lane in lanes_of(active) {
+            hits.set(lane, hit(lane));
         }
+        hits
+    }
+
+    /// Hits of the root group in `N` lanes from `start` on, by field as [`Hit`] has them: those whose bits are set.
+    #[inline]
+    pub(super) fn set_lanes<const N: usize>(
+        &mut self,
+        start: usize,
+        bits: u16,
+        [t, u, v]: [&[f32; N]; 3],
+        [primitive, geometry]: [&[u32; N]; 2],
+    ) {
+        let lanes = start..start + N;
+        self.t[lanes.clone()].copy_from_slice(t);
+        self.u[lanes.clone()].copy_from_slice(u);
+        self.v[lanes.clone()].copy_from_slice(v);
+        self.primitive[lanes.clone()].copy_from_slice(primitive);
+        self.geometry[lanes].copy_from_slice(geometry);
+        self.lanes |= bits << start;
     }
 
     /// Sets the hit of a lane.
     #[inline]
-    pub fn set(&mut self, lane: usize, hit: Option<Hit>) {
-        self.hits[lane] = hit;
+    pub const fn set(&mut self, lane: usize, hit: Option<Hit>) {
+        let bit = 1 << lane;
+        self.lanes &= !bit;
+        self.copies &= !bit;
+        let Some(hit) = hit else { return };
+        self.lanes |= bit;
+        (self.t[lane], self.u[lane], self.v[lane]) = (hit.t, hit.u, hit.v);
+        (self.primitive[lane], self.geometry[lane]) = (hit.primitive, hit.geometry);
+        if let Some(copy) = hit.copy {
+            self.copies |= bit;
+            self.copy[lane] = copy;
+        }
     }
 
     /// The hit of a lane, if any.
     #[inline]
-    pub fn get(&self, lane: usize) -> Option<&Hit> {
-        self.hits[lane].as_ref()
+    pub const fn get(&self, lane: usize) -> Option<Hit> {
+        if self.lanes >> lane & 1 == 0 {
+            return None;
+        }
+        Some(Hit {
+            t: self.t[lane],
+            u: self.u[lane],
+            v: self.v[lane],
+            primitive: self.primitive[lane],
+            geometry: self.geometry[lane],
+            copy: if self.copies >> lane & 1 == 1 { Some(self.copy[lane]) } else { None },
+        })
+    }
+
+    /// The lanes that hit something, as bits.
+    #[inline]
+    pub const fn lanes(&self) -> u16 {
+        self.lanes
+    }
+
+    /// Barycentric weights by lane, as [`Hit`] has them; without meaning where nothing was hit.
+    #[inline]
+    pub const fn weights(&self) -> [&[f32; LANES]; 2] {
+        [&self.u, &self.v]
+    }
+
+    /// Indices within the geometry, by lane; likewise.
+    #[inline]
+    pub const fn primitives(&self) -> &[u32; LANES] {
+        &self.primitive
+    }
+
+    /// The one geometry of the root group that all hits are of; none where there are several, or no hit.
+    #[inline]
+    pub fn only_geometry(&self) -> Option<u32> {
+        if self.lanes == 0 || self.copies != 0 {
+            return None;
+        }
+        let first = self.geometry[self.lanes.trailing_zeros() as usize % LANES];
+        let is_other = |lane: usize| (self.geometry[lane] != first) & (self.lanes >> lane & 1 == 1);
+        let others = (0..LANES).fold(false, |any, lane| any | is_other(lane));
+        (!others).then_some(first)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hit(number: u32, copy: Option<CopyRef>) -> Hit {
+        let t = number as f32 + 0.5;
+        Hit { t, u: 0.25, v: 0.5, primitive: 100 + number, geometry: number % 3, copy }
+    }
+
+    #[test]
+    fn hits_are_what_was_set_last() {
+        let copy = Some(CopyRef { set: 3, index: 7 });
+        let mut hits = HitBlock::from_fn(0b1010_0000_0000_0110, |lane| {
+            (lane != 2).then(|| hit(lane as u32, if lane == 13 { copy } else { None }))
+        });
+        assert_eq!(hits.lanes(), 0b1010_0000_0000_0010);
+        assert_eq!((hits.get(0), hits.get(2)), (None, None));
+        assert_eq!((hits.get(1), hits.get(13)), (Some(hit(1, None)), Some(hit(13, copy))));
+        hits.set(13, Some(hit(4, None)));
+        hits.set(1, None);
+        assert_eq!((hits.get(1), hits.get(13)), (None, Some(hit(4, None))));
+        hits.set_lanes(4, 0b101, [&[9.0; 4], &[0.1; 4], &[0.2; 4]], [&[1, 2, 3, 4], &[5, 6, 7, 8]]);
+        assert_eq!((hits.lanes(), hits.get(5)), (0b1010_0000_0101_0000, None));
+        let expected = Hit { t: 9.0, u: 0.1, v: 0.2, primitive: 3, geometry: 7, copy: None };
+        assert_eq!(hits.get(6), Some(expected));
+    }
+
+    #[test]
+    fn one_geometry_is_told_from_several() {
+        let of = |lanes: &[(usize, u32)], copy| {
+            let mut hits = HitBlock::NONE;
+            for (lane, geometry) in lanes {
+                hits.set(*lane, Some(Hit { geometry: *geometry, ..hit(0, copy) }));
+            }
+            hits.only_geometry()
+        };
+        assert_eq!(of(&[], None), None);
+        assert_eq!(of(&[(3, 2)], None), Some(2));
+        assert_eq!(of(&[(3, 2), (15, 2)], None), Some(2));
+        assert_eq!(of(&[(3, 2), (15, 0)], None), None);
+        assert_eq!(of(&[(3, 2), (15, 2)], Some(CopyRef { set: 0, index: 0 })), None);
     }
 }

@@ -163,14 +163,12 @@ impl EmbreeAccel {
             let set = self.sets[(hit.instance - self.first_set) as usize];
             Some(CopyRef { set, index: hit.instance_primitive })
         };
-        // Robust traversal leaves the weights a little outside where the origin is far.
-        let u = hit.u.clamp(0.0, 1.0);
-        let v = hit.v.clamp(0.0, 1.0 - u);
+        let (u, v) = weights(hit.u, hit.v);
         Some(Hit { t: hit.t, u, v, primitive: hit.primitive, geometry: hit.geometry, copy })
     }
 
     fn intersect_packets<const N: usize>(&self, rays: &RayBlock) -> HitBlock {
-        let mut hits = HitBlock::from_fn(0, |_| None);
+        let mut hits = HitBlock::NONE;
         for start in (0..LANES).step_by(N) {
             let bits = lane_bits::<N>(rays.active(), start);
             if bits == 0 {
@@ -179,7 +177,21 @@ impl EmbreeAccel {
             let mut packet = RayHitPacket::new(load::<N>(rays, start));
             self.scene.intersect_packet(&PacketMask::from_bits(bits), &mut packet, self.coherence);
             let (ray, hit) = (&packet.ray, &packet.hit);
-            for i in lanes_of(bits as u16).filter(|&i| hit.geometry[i] != INVALID_ID) {
+            // As in `hit`, side by side.
+            let (mut u, mut v, mut is_hit) = ([0.0; N], [0.0; N], [false; N]);
+            let mut is_copy = false;
+            for i in 0..N {
+                is_hit[i] = (hit.geometry[i] != INVALID_ID) & ray.t_max[i].is_finite();
+                is_copy |= is_hit[i] & (hit.instance[i] != INVALID_ID);
+                (u[i], v[i]) = weights(hit.u[i], hit.v[i]);
+            }
+            let bits = (0..N).fold(0, |bits, i| bits | u16::from(is_hit[i]) << i) & bits as u16;
+            if !is_copy {
+                let ids = [&hit.primitive, &hit.geometry];
+                hits.set_lanes(start, bits, [&ray.t_max, &u, &v], ids);
+                continue;
+            }
+            for i in lanes_of(bits) {
                 hits.set(
                     start + i,
                     self.hit(&embree::Hit {
@@ -265,6 +277,13 @@ impl RayQuery for EmbreeAccel {
     fn occluded_by_opaque_block(&self, rays: &RayBlock) -> u16 {
         self.occluded_in_packets(rays, OPAQUE)
     }
+}
+
+/// Barycentric weights: robust traversal leaves them a little outside where the origin is far.
+#[inline]
+fn weights(u: f32, v: f32) -> (f32, f32) {
+    let u = u.clamp(0.0, 1.0);
+    (u, v.clamp(0.0, 1.0 - u))
 }
 
 /// The active lanes among the `N` from `start` on.

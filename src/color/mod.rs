@@ -1,10 +1,12 @@
 //! Colour: linear Rec.709 triples, luminance, and the sRGB transfer curve at the edges (what a
 //! person types as `#rrggbb`, what a PNG stores). Nothing in between is ever non-linear.
 
+mod lanes;
 mod spectrum;
 
 use std::ops::{Add, AddAssign, Mul, MulAssign};
 
+pub use lanes::RgbLanes;
 pub use spectrum::{MAX_WEIGHT, VISIBLE_MAX, VISIBLE_MIN, Wavelength, cie_1931, rec709_from_xyz};
 
 /// A linear Rec.709 triple: a reflectance, a radiance, an irradiance, as the name beside it says.

@@ -11,7 +11,7 @@
 
 use std::ops::Range;
 
-use crate::color::Rgb;
+use crate::color::RgbLanes;
 
 /// Pixels of a block: 4 × 4, in rows.
 pub const BLOCK_LANES: usize = 16;
@@ -155,19 +155,18 @@ impl BlockAccumulator {
     ///
     /// Lanes that `valid` leaves out count as not sampled. A value that is not finite is left out too;
     /// returned are the lanes where that happened, as bits.
-    pub fn add(&mut self, index: u32, valid: u16, radiance: &[Rgb; BLOCK_LANES]) -> u16 {
+    pub fn add(&mut self, index: u32, valid: u16, radiance: &RgbLanes<BLOCK_LANES>) -> u16 {
         let mut dropped = 0;
         let replicates = self.replicates.len() as u32;
         let replicate = &mut self.replicates[(index % replicates) as usize];
         debug_assert_eq!(replicate.end, index / replicates, "samples come in order");
         replicate.push(|leaf| {
-            for (lane, value) in radiance.iter().enumerate() {
-                let is_valid = valid >> lane & 1 == 1;
-                let counts = is_valid & value.is_finite();
-                dropped |= u16::from(is_valid & !counts) << lane;
-                leaf.count[lane] = counts.into();
-                for (sum, x) in leaf.sum.iter_mut().zip(value.to_array()) {
-                    sum[lane] = if counts { x.into() } else { 0.0 };
+            let counts = counting(valid, radiance);
+            dropped = valid & !lanes_where(&counts);
+            leaf.count = counts.map(u32::from);
+            for (sum, values) in leaf.sum.iter_mut().zip(&radiance.0) {
+                for lane in 0..BLOCK_LANES {
+                    sum[lane] = if counts[lane] { values[lane].into() } else { 0.0 };
                 }
             }
         });
@@ -181,8 +180,8 @@ impl BlockAccumulator {
         let totals = &self.totals;
         let mut pixels = BlockPixels {
             origin,
-            mean: [Rgb::BLACK; BLOCK_LANES],
-            standard_error: [Rgb::splat(f32::NAN); BLOCK_LANES],
+            mean: RgbLanes::BLACK,
+            standard_error: RgbLanes([[f32::NAN; BLOCK_LANES]; 3]),
             samples: [0; BLOCK_LANES],
         };
         // Samples of each pixel, and replicates that have any.
@@ -217,10 +216,12 @@ impl BlockAccumulator {
             (mean, variance)
         });
         for lane in (0..BLOCK_LANES).filter(|lane| n[*lane] > 0.0) {
-            pixels.mean[lane] = std::array::from_fn(|c| channels[c].0[lane] as f32).into();
-            if filled[lane] > 1.0 {
-                pixels.standard_error[lane] =
-                    std::array::from_fn(|c| channels[c].1[lane].sqrt() as f32).into();
+            let out = pixels.mean.0.iter_mut().zip(&mut pixels.standard_error.0);
+            for ((mean, error), (sums, variances)) in out.zip(&channels) {
+                mean[lane] = sums[lane] as f32;
+                if filled[lane] > 1.0 {
+                    error[lane] = variances[lane].sqrt() as f32;
+                }
             }
         }
         pixels
@@ -288,10 +289,10 @@ pub struct BlockPixels {
     /// Absolute coordinates of the first pixel; multiples of 4.
     pub origin: [u32; 2],
     /// Mean radiance, in rows of 4.
-    pub mean: [Rgb; BLOCK_LANES],
+    pub mean: RgbLanes<BLOCK_LANES>,
     /// Standard error of that mean; NaN where the samples do not show it: fewer than two replicates
     /// have any.
-    pub standard_error: [Rgb; BLOCK_LANES],
+    pub standard_error: RgbLanes<BLOCK_LANES>,
     /// Samples that counted.
     pub samples: [u32; BLOCK_LANES],
 }
@@ -302,36 +303,52 @@ impl BlockPixels {
     pub fn of_one_sample(
         origin: [u32; 2],
         valid: u16,
-        radiance: &[Rgb; BLOCK_LANES],
+        radiance: &RgbLanes<BLOCK_LANES>,
     ) -> (Self, u16) {
         let mut pixels = Self {
             origin,
-            mean: [Rgb::BLACK; BLOCK_LANES],
-            standard_error: [Rgb::splat(f32::NAN); BLOCK_LANES],
+            mean: RgbLanes::BLACK,
+            standard_error: RgbLanes([[f32::NAN; BLOCK_LANES]; 3]),
             samples: [0; BLOCK_LANES],
         };
-        let mut dropped = 0;
-        for (lane, value) in radiance.iter().enumerate() {
-            let is_valid = valid >> lane & 1 == 1;
-            let counts = is_valid & value.is_finite();
-            dropped |= u16::from(is_valid & !counts) << lane;
-            pixels.samples[lane] = counts.into();
-            // From nothing, as sums begin: −0 becomes 0.
-            pixels.mean[lane] = Rgb::BLACK + if counts { *value } else { Rgb::BLACK };
+        let counts = counting(valid, radiance);
+        pixels.samples = counts.map(u32::from);
+        for (mean, values) in pixels.mean.0.iter_mut().zip(&radiance.0) {
+            for lane in 0..BLOCK_LANES {
+                // From nothing, as sums begin: −0 becomes 0.
+                mean[lane] = 0.0 + if counts[lane] { values[lane] } else { 0.0 };
+            }
         }
-        (pixels, dropped)
+        (pixels, valid & !lanes_where(&counts))
     }
+}
+
+/// Which values count: the `valid` ones that are finite.
+#[inline(always)]
+fn counting(valid: u16, radiance: &RgbLanes<BLOCK_LANES>) -> [bool; BLOCK_LANES] {
+    let [r, g, b] = &radiance.0;
+    std::array::from_fn(|lane| {
+        let is_finite = r[lane].is_finite() & g[lane].is_finite() & b[lane].is_finite();
+        (valid >> lane & 1 == 1) & is_finite
+    })
+}
+
+/// The lanes whose flag is set, as bits.
+#[inline(always)]
+fn lanes_where(flags: &[bool; BLOCK_LANES]) -> u16 {
+    (0..BLOCK_LANES).fold(0, |bits, lane| bits | u16::from(flags[lane]) << lane)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::color::Rgb;
 
     fn accumulate(n: u32, value: impl Fn(u32) -> f32) -> BlockPixels {
         let mut block = BlockAccumulator::new(4);
         block.restart(0);
         for i in 0..n {
-            assert_eq!(block.add(i, u16::MAX, &[Rgb::splat(value(i)); BLOCK_LANES]), 0);
+            assert_eq!(block.add(i, u16::MAX, &RgbLanes::splat(Rgb::splat(value(i)))), 0);
         }
         block.finish([0, 0])
     }
@@ -340,38 +357,38 @@ mod tests {
     fn a_million_samples_lose_no_digit() {
         // 0.1 as f32, a million times: the mean is 0.1 to the last bit.
         let pixels = accumulate(1_000_000, |_| 0.1);
-        assert_eq!(pixels.mean[5], Rgb::splat(0.1));
-        assert_eq!(pixels.standard_error[5], Rgb::BLACK);
+        assert_eq!(pixels.mean.get(5), Rgb::splat(0.1));
+        assert_eq!(pixels.standard_error.get(5), Rgb::BLACK);
         // A huge sample among small ones: sum = 1e8 + 999,999 · 0.25, known exactly.
         let pixels = accumulate(1_000_000, |i| if i == 77 { 1e8 } else { 0.25 });
-        assert_eq!(pixels.mean[0].r, ((1e8 + 999_999.0 * 0.25) / 1e6) as f32);
+        assert_eq!(pixels.mean.get(0).r, ((1e8 + 999_999.0 * 0.25) / 1e6) as f32);
     }
 
     #[test]
     fn the_error_is_that_of_the_replicates() {
         // Replicate r is constant with value r, so the means are 0, 1, 2, 3: variance of their mean 5/12.
         let pixels = accumulate(64, |i| (i % 4) as f32);
-        assert_eq!(pixels.mean[3].g, 1.5);
-        assert!((pixels.standard_error[3].g - (5f32 / 12.0).sqrt()).abs() < 1e-6);
+        assert_eq!(pixels.mean.get(3).g, 1.5);
+        assert!((pixels.standard_error.get(3).g - (5f32 / 12.0).sqrt()).abs() < 1e-6);
         // A single replicate shows nothing.
-        assert!(accumulate(1, |_| 1.0).standard_error[3].g.is_nan());
+        assert!(accumulate(1, |_| 1.0).standard_error.get(3).g.is_nan());
     }
 
     #[test]
     fn values_that_are_not_finite_are_left_out() {
         let mut block = BlockAccumulator::new(4);
         block.restart(0);
-        let mut radiance = [Rgb::splat(2.0); BLOCK_LANES];
-        radiance[3] = Rgb::new(0.0, f32::NAN, 0.0);
+        let mut radiance = RgbLanes::splat(Rgb::splat(2.0));
+        radiance.set(3, Rgb::new(0.0, f32::NAN, 0.0));
         assert_eq!(block.add(0, u16::MAX, &radiance), 1 << 3);
-        assert_eq!(block.add(1, u16::MAX, &[Rgb::splat(4.0); BLOCK_LANES]), 0);
+        assert_eq!(block.add(1, u16::MAX, &RgbLanes::splat(Rgb::splat(4.0))), 0);
         let pixels = block.finish([0, 0]);
-        assert_eq!((pixels.mean[3].r, pixels.mean[4].r), (4.0, 3.0));
+        assert_eq!((pixels.mean.get(3).r, pixels.mean.get(4).r), (4.0, 3.0));
     }
 
     #[test]
     fn what_is_stored_goes_on_to_the_same_bits() {
-        let value = |i: u32| [Rgb::new((i as f32).sin(), 1.0 / (i + 1) as f32, 0.1); BLOCK_LANES];
+        let value = |i: u32| RgbLanes::splat(Rgb::new((i as f32).sin(), 1.0 / (i + 1) as f32, 0.1));
         let mut whole = BlockAccumulator::new(4);
         whole.restart(0);
         let mut parts = BlockAccumulator::new(4);
@@ -394,7 +411,7 @@ mod tests {
 
     #[test]
     fn parts_join_to_the_same_bits() {
-        let value = |i: u32| [Rgb::new((i as f32).sin(), 1.0 / (i + 1) as f32, 0.1); BLOCK_LANES];
+        let value = |i: u32| RgbLanes::splat(Rgb::new((i as f32).sin(), 1.0 / (i + 1) as f32, 0.1));
         let sums = |range: Range<u32>| {
             let mut block = BlockAccumulator::new(4);
             block.restart(range.start);
@@ -418,9 +435,9 @@ mod tests {
 
     #[test]
     fn one_sample_is_the_same_without_sums() {
-        let mut radiance = std::array::from_fn(|lane| Rgb::new(0.1, lane as f32, -0.0));
-        radiance[5] = Rgb::new(f32::INFINITY, 0.0, 0.0);
-        radiance[15] = Rgb::splat(f32::NAN);
+        let mut radiance = RgbLanes::from_fn(|lane| Rgb::new(0.1, lane as f32, -0.0));
+        radiance.set(5, Rgb::new(f32::INFINITY, 0.0, 0.0));
+        radiance.set(15, Rgb::splat(f32::NAN));
         let mut block = BlockAccumulator::new(4);
         block.restart(0);
         let dropped = block.add(0, 0x7fff, &radiance);
@@ -428,7 +445,7 @@ mod tests {
         assert_eq!((also, dropped), (1 << 5, 1 << 5));
         let expected = block.finish([8, 4]);
         assert_eq!((pixels.origin, pixels.mean), (expected.origin, expected.mean));
-        assert!(pixels.standard_error.iter().all(|e| e.r.is_nan() && e.g.is_nan() && e.b.is_nan()));
+        assert!(pixels.standard_error.0.iter().flatten().all(|e| e.is_nan()));
     }
 
     #[test]

@@ -13,9 +13,11 @@ pub use filter::{Filter, FilterSample, FilterTable};
 pub use layers::{Aov, CenterLayers, Layers, Shares, add_share};
 pub use picture::Picture;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use crate::color::Rgb;
+use crate::color::{Rgb, RgbLanes};
 use crate::pages::prefer_large;
 use crate::sampler::REPLICATES;
 
@@ -104,25 +106,31 @@ impl Film {
 
     /// Writes the pixels of a block that lie inside the window.
     pub fn put(&mut self, block: &BlockPixels) {
-        for (lane, (&mean, &error)) in block.mean.iter().zip(&block.standard_error).enumerate() {
-            let [x, y] = [block.origin[0] + lane as u32 % 4, block.origin[1] + lane as u32 / 4];
-            if let Some(i) = self.index(x, y) {
-                self.mean[i] = mean;
-                if let Some(plane) = &mut self.standard_error {
-                    plane[i] = error;
+        for (row, y) in (0..4).zip(block.origin[1]..) {
+            // Of most blocks all is inside.
+            let Some((first, lanes)) = self.row(block.origin[0], y) else { continue };
+            let (from, to) = (4 * row + lanes.start, 4 * row + lanes.end);
+            let places = first..first + lanes.len();
+            let set = |plane: &mut [Rgb], values: &RgbLanes<BLOCK_LANES>| {
+                for (pixel, lane) in plane.iter_mut().zip(from..to) {
+                    *pixel = values.get(lane);
                 }
-                if let Some(samples) = self.layers.samples.get_mut(i) {
-                    *samples = block.samples[lane];
-                }
+            };
+            set(&mut self.mean[places.clone()], &block.mean);
+            if let Some(plane) = &mut self.standard_error {
+                set(&mut plane[places.clone()], &block.standard_error);
+            }
+            if let Some(samples) = self.layers.samples.get_mut(places) {
+                samples.copy_from_slice(&block.samples[from..to]);
             }
         }
     }
 
     /// Writes the pixels of a block of a layer, by its place among the layers' means.
-    pub fn put_layer(&mut self, layer: usize, origin: [u32; 2], values: &[Rgb; BLOCK_LANES]) {
-        for (lane, value) in values.iter().enumerate() {
+    pub fn put_layer(&mut self, layer: usize, origin: [u32; 2], values: &RgbLanes<BLOCK_LANES>) {
+        for lane in 0..BLOCK_LANES {
             if let Some(i) = self.index(origin[0] + lane as u32 % 4, origin[1] + lane as u32 / 4) {
-                self.layers.means[layer].1[i] = *value;
+                self.layers.means[layer].1[i] = values.get(lane);
             }
         }
     }
@@ -141,6 +149,17 @@ impl Film {
     /// The mean of the pixel at absolute coordinates; none outside the window.
     pub fn pixel(&self, x: u32, y: u32) -> Option<Rgb> {
         self.index(x, y).map(|i| self.mean[i])
+    }
+
+    /// What of four pixels from `x` on lies in the window: the place of the first, and which of the four.
+    #[inline]
+    fn row(&self, x: u32, y: u32) -> Option<(usize, Range<usize>)> {
+        let w = &self.window;
+        let (from, to) = (x.max(w.x0), (x + 4).min(w.x1));
+        if from >= to {
+            return None;
+        }
+        Some((self.index(from, y)?, (from - x) as usize..(to - x) as usize))
     }
 
     fn index(&self, x: u32, y: u32) -> Option<usize> {

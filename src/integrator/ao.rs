@@ -2,7 +2,7 @@
 
 use super::{CameraBlock, Integrator, RayCounts};
 use crate::accel::{LANES, RayQuery, lanes_where};
-use crate::color::Rgb;
+use crate::color::{Rgb, RgbLanes};
 use crate::math::{Vec3Lanes, cosine_hemisphere};
 use crate::sampler::{Dimensions, Sampler};
 use crate::scene::Scene;
@@ -19,7 +19,7 @@ impl Integrator for Ao {
         query: &Q,
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
-    ) -> [Rgb; LANES] {
+    ) -> RgbLanes<LANES> {
         let distance = scene.settings.ao_distance.map_or(f32::INFINITY, |d| d as f32);
         let points = scene.surfaces(camera.rays, camera.hits);
         let [u, v] = Sampler::numbers(camera.samplers, Dimensions::Direction);
@@ -34,7 +34,7 @@ impl Integrator for Ao {
         let above = lanes_where(&is_above) & points.hit();
         counts.diffuse += u64::from(above.count_ones());
         let rays = scene.spawn_block(&points, &directions, &[distance; LANES], above);
-        std::array::from_fn(|lane| match (points.hit() >> lane & 1, above >> lane & 1) {
+        RgbLanes::from_fn(|lane| match (points.hit() >> lane & 1, above >> lane & 1) {
             (0, _) => scene.background,
             // They spread: packets would be slower.
             (_, 1) if !query.occluded(&rays.get(lane)) => Rgb::splat(1.0),

@@ -2,7 +2,7 @@
 
 use super::{CameraBlock, Integrator, RayCounts};
 use crate::accel::{LANES, RayQuery};
-use crate::color::Rgb;
+use crate::color::RgbLanes;
 use crate::scene::{Cone, Scene};
 
 /// Shows the albedo of the first surface.
@@ -16,8 +16,8 @@ impl Integrator for Flat {
         _query: &Q,
         camera: &CameraBlock<'_>,
         _counts: &mut RayCounts,
-    ) -> [Rgb; LANES] {
-        std::array::from_fn(|lane| match camera.hits.get(lane) {
+    ) -> RgbLanes<LANES> {
+        RgbLanes::from_fn(|lane| match &camera.hits.get(lane) {
             None => scene.background,
             Some(hit) if !scene.has_maps() => scene.material(hit).albedo(),
             Some(hit) => {

@@ -12,7 +12,7 @@ pub use flat::Flat;
 pub use whitted::{Everything, Features, Local, Tree, Whitted};
 
 use crate::accel::{HitBlock, LANES, RayBlock, RayQuery};
-use crate::color::Rgb;
+use crate::color::RgbLanes;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
@@ -37,7 +37,7 @@ pub trait Integrator: Sync {
         query: &Q,
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
-    ) -> [Rgb; LANES];
+    ) -> RgbLanes<LANES>;
 
     /// As [`Integrator::shade`]; beside it, what of that is the light of the first surface itself: its own,
     /// and what it has straight from lights.
@@ -47,7 +47,7 @@ pub trait Integrator: Sync {
         query: &Q,
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
-    ) -> ([Rgb; LANES], [Rgb; LANES]) {
+    ) -> (RgbLanes<LANES>, RgbLanes<LANES>) {
         let radiance = self.shade(scene, query, camera, counts);
         (radiance, radiance)
     }

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::state::BlockState;
 use super::{NON_FINITE_TOLD, NonFinite, Observer};
 use crate::accel::{LANES, RayBlock, RayQuery, lanes_of};
-use crate::color::Rgb;
+use crate::color::RgbLanes;
 use crate::film::{
     Aov, BLOCK_LANES, BlockAccumulator, BlockPixels, FilterTable, Layers, PixelRect, Shares,
     add_share, cryptomatte_id,
@@ -120,12 +120,6 @@ impl BlockSampling {
     }
 }
 
-fn weigh(values: &mut [Rgb; LANES], weights: &[f32; LANES]) {
-    for (value, weight) in values.iter_mut().zip(weights) {
-        *value *= *weight;
-    }
-}
-
 /// The layers that samples add to.
 pub(super) struct SampledLayers {
     pub(super) means: Vec<Aov>,
@@ -166,22 +160,20 @@ impl SampledLayers {
         sample: u32,
         inside: u16,
         camera: &CameraBlock<'_>,
-        direct: [Rgb; LANES],
+        direct: &RgbLanes<LANES>,
         weights: &[f32; LANES],
         sums: &mut BlockSampling,
     ) {
         let first = self.has_first_hits.then(|| FirstHits::of(scene, camera));
         for (aov, sums) in self.means.iter().zip(&mut sums.means) {
             let of_first = first.as_ref().and_then(|first| first.values(*aov));
-            let mut values = *of_first.unwrap_or(&direct);
-            weigh(&mut values, weights);
-            sums.add(sample, inside, &values);
+            sums.add(sample, inside, &of_first.unwrap_or(direct).weighed(weights));
         }
         for (aov, pixels) in self.mattes.iter().zip(&mut sums.mattes) {
             for lane in lanes_of(inside) {
                 let id = camera.hits.get(lane).map_or(0, |hit| match aov {
-                    Aov::CryptoObject => self.object_ids[scene.object_index(hit) as usize],
-                    _ => self.material_ids[scene.material_index(hit) as usize],
+                    Aov::CryptoObject => self.object_ids[scene.object_index(&hit) as usize],
+                    _ => self.material_ids[scene.material_index(&hit) as usize],
                 });
                 let count = if weights[lane] < 0.0 { -1 } else { 1 };
                 add_share(&mut pixels[lane], id, count);
@@ -195,7 +187,7 @@ impl SampledLayers {
 pub(super) struct TileOutput {
     pub(super) blocks: Vec<BlockPixels>,
     /// Of each block in turn, the mean of each layer.
-    pub(super) means: Vec<[Rgb; BLOCK_LANES]>,
+    pub(super) means: Vec<RgbLanes<BLOCK_LANES>>,
     /// Of each block in turn, the shares of each Cryptomatte.
     pub(super) mattes: Vec<[Shares; BLOCK_LANES]>,
     pub(super) rays: RayCounts,
@@ -287,16 +279,16 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             output.rays.camera += u64::from(rays.active().count_ones());
             let hits = self.query.intersect_block(&rays);
             let camera = CameraBlock { rays: &rays, hits: &hits, samplers: &samplers };
-            let (mut radiance, direct) = if self.layers.has_direct {
+            let (radiance, direct) = if self.layers.has_direct {
                 self.integrator.shade_split(self.scene, self.query, &camera, &mut output.rays)
             } else {
                 let radiance =
                     self.integrator.shade(self.scene, self.query, &camera, &mut output.rays);
-                (radiance, [Rgb::BLACK; LANES])
+                (radiance, RgbLanes::BLACK)
             };
-            weigh(&mut radiance, &weights);
+            let radiance = radiance.weighed(&weights);
             if !self.layers.are_none() {
-                self.layers.add(self.scene, sample, inside, &camera, direct, &weights, sums);
+                self.layers.add(self.scene, sample, inside, &camera, &direct, &weights, sums);
             }
             let dropped = if is_all {
                 let (pixels, dropped) = BlockPixels::of_one_sample(origin, inside, &radiance);

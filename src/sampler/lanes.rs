@@ -7,12 +7,23 @@ use sobol_burley::parts::{hash, owen_scramble_rev, sobol_rev, u32_to_f32_norm};
 
 use super::{Dimensions, Sampler};
 
-/// What the two highest bytes of an index, bits reversed, add to the first four dimensions, by their values:
-/// the Sobol matrices. They are linear, so the generator itself tells the parts; it takes no lower bits.
-static TABLES: LazyLock<[[[u32; 4]; 256]; 2]> = LazyLock::new(|| {
-    let entry = |bits: u32| std::array::from_fn(|d| sobol_rev(bits, d as u32));
+/// What the two highest bytes of an index, bits reversed, add to the third and the fourth dimension, by their
+/// values: the Sobol matrices. They are linear, so the generator itself tells the parts; it takes no lower bits.
+static TABLES: LazyLock<[[[u32; 2]; 256]; 2]> = LazyLock::new(|| {
+    let entry = |bits: u32| std::array::from_fn(|d| sobol_rev(bits, 2 + d as u32));
     [24, 16].map(|shift| std::array::from_fn(|byte| entry((byte as u32) << shift)))
 });
+
+/// The second dimension, bits reversed, of an index of sixteen bits. As polynomials over GF(2), highest powers last,
+/// column i of its matrix is (1 + x)ⁱ: the index with 1 + x in the place of x, half by half.
+#[inline(always)]
+const fn second_rev(index: u32) -> u32 {
+    let mut x = index;
+    x ^= x >> 8 & 0x00ff_00ff;
+    x ^= x >> 4 & 0x0f0f_0f0f;
+    x ^= x >> 2 & 0x3333_3333;
+    x ^ x >> 1 & 0x5555_5555
+}
 
 impl Sampler {
     /// The first `D` of [`Sampler::four`] for `N` samplers, by dimension.
@@ -29,13 +40,22 @@ impl Sampler {
             let reversed = samplers[i].index.reverse_bits();
             index[i] = owen_scramble_rev(reversed, hash(seeds[i] ^ 0x79c6_8e4a));
         }
-        let [high, low] = &*TABLES;
         let mut sobol = [[0u32; N]; D];
-        for i in 0..N {
-            let [a, b, ..] = index[i].to_be_bytes();
-            let (a, b) = (&high[a as usize], &low[b as usize]);
-            for d in 0..D {
-                sobol[d][i] = a[d] ^ b[d];
+        // The first two without a table: their matrices are those of a reversal and of Pascal's triangle.
+        let low: [u32; N] = std::array::from_fn(|i| (index[i] & 0xffff_0000).reverse_bits());
+        for (d, sobol) in sobol.iter_mut().enumerate().take(2) {
+            for i in 0..N {
+                sobol[i] = if d == 0 { low[i] } else { second_rev(low[i]) };
+            }
+        }
+        if D > 2 {
+            let [high, low] = &*TABLES;
+            for i in 0..N {
+                let [a, b, ..] = index[i].to_be_bytes();
+                let (a, b) = (&high[a as usize], &low[b as usize]);
+                for d in 2..D {
+                    sobol[d][i] = a[d - 2] ^ b[d - 2];
+                }
             }
         }
         let mut numbers = [[0.0; N]; D];

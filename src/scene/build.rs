@@ -84,7 +84,7 @@ pub struct Scene {
     /// Textures of each material; none where none has any.
     pub(super) maps: Vec<Maps>,
     pub(super) frames: Vec<DAffine3>,
-    root_looks: Vec<GeometryLooks>,
+    pub(super) root_looks: Vec<GeometryLooks>,
     prototype_looks: Vec<Vec<GeometryLooks>>,
     copy_objects: Vec<CopyObjects>,
     object_names: Vec<String>,

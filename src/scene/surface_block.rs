@@ -6,6 +6,7 @@
 use glam::{DVec3, Vec3};
 
 use super::build::Scene;
+use super::draft::GeometryLooks;
 use super::hollow::{FarSide, SphereId};
 use super::media::Crossing;
 use super::surface::{
@@ -45,6 +46,12 @@ impl SurfaceBlock {
     #[inline]
     pub fn material<'s>(&self, scene: &'s Scene, lane: usize) -> &'s Material {
         &scene.materials[self.material[lane] as usize]
+    }
+
+    /// The lanes whose material is that of `lane`, as bits; also some of those that hit nothing.
+    #[inline]
+    pub fn lanes_like(&self, lane: usize) -> u16 {
+        lanes_where(&self.material.map(|material| material == self.material[lane]))
     }
 
     /// The passage of a ray of a lane that is inside of `interior` through its surface.
@@ -91,17 +98,29 @@ impl Scene {
             hit: 0,
             spheres: Spheres::NONE,
         };
+        block.hit = hits.lanes();
+        if let Some((mesh, looks)) = self.only_flat_mesh(hits) {
+            for lane in lanes_of(block.hit) {
+                block.material[lane] = looks.of(hits.primitives()[lane]).material;
+            }
+            let corners = corners_of(mesh, hits);
+            let SurfaceBlock { position, error, geometric_normal, is_front, normal, .. } =
+                &mut block;
+            let [u, v] = hits.weights();
+            on_triangles(&corners, u, v, position, error, geometric_normal);
+            *normal = *geometric_normal;
+            face(rays, geometric_normal, normal, is_front);
+            return block;
+        }
         // Triangles are gathered, first their indices and then their corners, so that memory is asked for
         // all that it takes a while to bring at once; what else there is follows one by one.
         let mut faces: [Option<(&TriangleMesh, [u32; 3])>; LANES] = [None; LANES];
         let mut corners = [Vec3Lanes::<LANES>::ZERO; 3];
-        let (mut u, mut v) = ([0.0; LANES], [0.0; LANES]);
         let mut smooth = Vec3Lanes::<LANES>::ZERO;
         let mut is_smooth = [false; LANES];
         let (mut triangles, mut others, mut copies) = (0u16, 0u16, 0u16);
-        for lane in rays.lanes() {
-            let Some(hit) = hits.get(lane) else { continue };
-            block.hit |= 1 << lane;
+        for lane in lanes_of(block.hit) {
+            let Some(hit) = &hits.get(lane) else { continue };
             let geometry = &self.world.group(hit.copy).geometries[hit.geometry as usize];
             let Geometry::Mesh(mesh) = geometry else {
                 match self.sphere(hit) {
@@ -117,7 +136,6 @@ impl Scene {
             block.material[lane] = self.look(hit).material;
             copies |= u16::from(hit.copy.is_some()) << lane;
             faces[lane] = Some((mesh, mesh.triangles[hit.primitive as usize]));
-            (u[lane], v[lane]) = (hit.u, hit.v);
             if let Some(normal) = smooth_normal(mesh, hit) {
                 smooth.set(lane, normal);
                 is_smooth[lane] = true;
@@ -133,7 +151,8 @@ impl Scene {
 
         if triangles != 0 {
             let SurfaceBlock { position, error, geometric_normal, .. } = &mut block;
-            on_triangles(&corners, &u, &v, position, error, geometric_normal);
+            let [u, v] = hits.weights();
+            on_triangles(&corners, u, v, position, error, geometric_normal);
             block.normal = block.geometric_normal;
             if is_smooth.contains(&true) {
                 for i in 0..LANES {
@@ -162,10 +181,23 @@ impl Scene {
         }
         for lane in lanes_of(others) {
             if let Some(hit) = hits.get(lane) {
-                block.set(lane, &self.surface(&rays.get(lane), hit));
+                block.set(lane, &self.surface(&rays.get(lane), &hit));
             }
         }
         block
+    }
+
+    /// The one mesh of the root group that all of the hits are of, if it has no normals, and its looks: what most
+    /// blocks of a scene of one mesh see, and nothing is left to be told apart.
+    #[inline]
+    fn only_flat_mesh(&self, hits: &HitBlock) -> Option<(&TriangleMesh, &GeometryLooks)> {
+        let geometry = hits.only_geometry()? as usize;
+        match &self.world.root.geometries[geometry] {
+            Geometry::Mesh(mesh) if mesh.normals.is_none() => {
+                Some((mesh, &self.root_looks[geometry]))
+            }
+            _ => None,
+        }
     }
 
     /// The rays that leave the points of `lanes` into `directions` (unit length), as far as `distances`;
@@ -208,7 +240,7 @@ impl Scene {
         }
         let (far, is_right) = far_sides(&points.spheres, &rays);
         for lane in lanes_of(within) {
-            let Some(hit) = hits.get(lane) else { continue };
+            let Some(hit) = &hits.get(lane) else { continue };
             if is_right[lane] {
                 rays.t_max[lane] = as_far_as(far[lane]);
                 let &Hit { geometry, primitive, .. } = hit;
@@ -248,6 +280,23 @@ fn far_sides(spheres: &Spheres, rays: &RayBlock) -> ([f64; LANES], [bool; LANES]
         is_right[i] = is_within & (t > f64::from(ray.t_min));
     }
     (far, is_right)
+}
+
+/// The corners of the triangles that were hit, all of one mesh: first all indices, then all positions, so that
+/// memory is asked at once for all that it takes a while to bring.
+#[inline(never)]
+fn corners_of(mesh: &TriangleMesh, hits: &HitBlock) -> [Vec3Lanes<LANES>; 3] {
+    let mut faces = [[0; 3]; LANES];
+    for lane in lanes_of(hits.lanes()) {
+        faces[lane] = mesh.triangles[hits.primitives()[lane] as usize];
+    }
+    let mut corners = [Vec3Lanes::ZERO; 3];
+    for lane in lanes_of(hits.lanes()) {
+        for (corners, vertex) in corners.iter_mut().zip(faces[lane]) {
+            corners.set(lane, mesh.positions.get(vertex as usize));
+        }
+    }
+    corners
 }
 
 /// Position, error and normal of points on triangles.
@@ -455,7 +504,7 @@ mod tests {
             }
             let (next, sides) = scene.spawn_block_on(&block, &hits, &directions, block.hit());
             for lane in rays.lanes() {
-                let Some(hit) = hits.get(lane) else {
+                let Some(hit) = &hits.get(lane) else {
                     assert_eq!(block.hit() >> lane & 1, 0);
                     continue;
                 };
@@ -472,5 +521,40 @@ mod tests {
         }
         let counts = [on_spheres, on_others, known, bounded];
         assert!(counts.iter().all(|&n| n > 500), "{counts:?}");
+    }
+
+    /// So it is where all that is hit is one flat mesh, which is looked up once for all lanes.
+    #[test]
+    fn blocks_of_one_mesh_are_as_their_lanes() {
+        let mut next = numbers(13);
+        let mut point = || DVec3::new(next(), next(), next());
+        let corners = (0..60).flat_map(|_| point().as_vec3().to_array()).collect();
+        let triangles = (0..58).map(|i| [i, i + 1, i + 2]).collect();
+        let mut desc = SceneDesc::default();
+        desc.meshes.push(TriangleMesh::new(corners, triangles));
+        desc.objects.push(ObjectDesc::new(ShapeDesc::Mesh(0), None));
+        let scene = Scene::build_quietly(desc, AccelKind::default()).unwrap();
+        let (mut found, mut missed) = (0, 0);
+        for round in 0..500 {
+            let eye = point() * 4.0;
+            let mut rays = RayBlock::empty();
+            for lane in (0..LANES).filter(|lane| round % 4 == 0 || (round + lane) % 3 != 0) {
+                let direction = (point() - eye).normalize().as_vec3();
+                rays.set(lane, &Ray::new(eye.as_vec3(), direction));
+            }
+            let hits = scene.accel.query().intersect_block(&rays);
+            assert_eq!(hits.only_geometry().is_some(), hits.lanes() != 0);
+            let block = scene.surfaces(&rays, &hits);
+            assert_eq!(block.hit(), hits.lanes());
+            missed += (rays.active() & !hits.lanes()).count_ones();
+            for lane in lanes_of(hits.lanes()) {
+                let hit = hits.get(lane).unwrap();
+                let expected = scene.surface(&rays.get(lane), &hit);
+                let point = block.point(&scene, &hit, lane);
+                assert_eq!(format!("{point:?}"), format!("{expected:?}"));
+                found += 1;
+            }
+        }
+        assert!(found > 500 && missed > 500, "{found} {missed}");
     }
 }

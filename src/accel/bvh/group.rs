@@ -7,7 +7,7 @@ use super::super::AccelError;
 use super::super::world::{CopyRef, Geometry, Group, World, affine_from_rows};
 use super::build::{Kind, Primitives, Reference, build};
 use super::node::{Child, Tree};
-use super::simd::{Kernel, Simd};
+use super::simd::{Kernel, Simd, place, prefetch};
 use super::traverse::{Found, Items, any, closest};
 use super::watch::Watch;
 use crate::geometry::{AnalyticShape, Shapes, Sphere, with_shapes};
@@ -144,6 +144,13 @@ impl GroupTree {
         (&self.geometries[geometry], geometry as u32, id - self.first_primitives[geometry])
     }
 
+    /// Whether there is nothing but one mesh.
+    #[inline]
+    pub(super) fn is_one_mesh(&self) -> bool {
+        let Tree { is_of_triangles, endless, .. } = &self.tree;
+        *is_of_triangles && endless.is_empty() && self.geometries.len() == 1
+    }
+
     /// Whether an item is a shape, not a copy; if so, of which geometry, and its number in that.
     #[inline]
     fn shape(&self, item: u32) -> Option<(usize, u32)> {
@@ -241,6 +248,9 @@ impl Items for ShapeItems<'_> {
     fn is_clear(self, id: u32) -> bool {
         is_clear(self.0, id)
     }
+
+    #[inline(always)]
+    fn foresee(self, _id: u32) {}
 }
 
 impl<const ROBUST: bool> Items for RootItems<'_, ROBUST> {
@@ -273,6 +283,15 @@ impl<const ROBUST: bool> Items for RootItems<'_, ROBUST> {
     #[inline(always)]
     fn is_clear(self, id: u32) -> bool {
         is_clear(self.root, id)
+    }
+
+    #[inline(always)]
+    fn foresee(self, id: u32) {
+        if let [Geometry::Mesh(mesh)] = &self.root.geometries[..]
+            && self.root.tree.is_large()
+        {
+            prefetch::<{ size_of::<[u32; 3]>() }>(place(&mesh.triangles[..], id as usize));
+        }
     }
 }
 

@@ -19,12 +19,12 @@ mod watch;
 
 use rayon::prelude::*;
 
-use super::block::{HitBlock, LANES, RayBlock};
+use super::block::{HitBlock, LANES, RayBlock, lanes_where};
 use super::world::{CopyRef, World};
 use super::{AccelError, AccelInfo, BuildOptions, BuildQuality, Hit, Precision, RayQuery};
 use crate::math::Ray;
 use group::{Copy, GroupTree, RootItems};
-use packet::Packet;
+use packet::{FoundLanes, Packet};
 use simd::{Isa, Kernel, Simd};
 use traverse::Found;
 use watch::Watch;
@@ -124,10 +124,28 @@ impl BvhAccel {
             }
         };
         let (_, geometry, primitive) = group.primitive(found.id);
-        // Weights are rounded, and their sum with them.
-        let u = found.u.clamp(0.0, 1.0);
-        let v = found.v.clamp(0.0, 1.0 - u);
+        let (u, v) = weights(found.u, found.v);
         Hit { t: found.t, u, v, primitive, geometry, copy }
+    }
+
+    /// The same for a block.
+    #[inline(always)]
+    fn hits(&self, active: u16, found: &FoundLanes) -> HitBlock {
+        if !self.root.is_one_mesh() {
+            return HitBlock::from_fn(active, |lane| {
+                found.get(lane).if_any().map(|found| self.hit(&found))
+            });
+        }
+        // Its primitives are numbered as those of the tree.
+        let (mut u, mut v, mut is_hit) = ([0.0; LANES], [0.0; LANES], [false; LANES]);
+        for i in 0..LANES {
+            (u[i], v[i]) = weights(found.u[i], found.v[i]);
+            is_hit[i] = found.id[i] != Found::NOTHING;
+        }
+        let mut hits = HitBlock::NONE;
+        let bits = lanes_where(&is_hit) & active;
+        hits.set_lanes(0, bits, [&found.t, &u, &v], [&found.id, &[0; LANES]]);
+        hits
     }
 
     fn items<const ROBUST: bool>(&self) -> RootItems<'_, ROBUST> {
@@ -201,6 +219,13 @@ impl RayQuery for BvhAccel {
     }
 }
 
+/// Barycentric weights: they are rounded, and their sum with them.
+#[inline(always)]
+const fn weights(u: f32, v: f32) -> (f32, f32) {
+    let u = u.clamp(0.0, 1.0);
+    (u, v.clamp(0.0, 1.0 - u))
+}
+
 struct Closest<'a, const ROBUST: bool> {
     accel: &'a BvhAccel,
     ray: &'a Ray,
@@ -251,7 +276,7 @@ impl<const ROBUST: bool> Kernel for ClosestOfBlock<'_, ROBUST> {
         let tree = &accel.root.tree;
         let best =
             packet::closest::<S, ROBUST>(simd, tree, accel.items::<ROBUST>(), rays, &mut packet);
-        HitBlock::from_fn(rays.active(), |lane| best[lane].if_any().map(|found| accel.hit(&found)))
+        accel.hits(rays.active(), &best)
     }
 }
 

@@ -144,6 +144,12 @@ impl Tree {
         Self { is_large: tree.bytes() >= Self::LARGE, ..tree }
     }
 
+    /// Whether it is more than caches hold, and likely what is behind it too.
+    #[inline(always)]
+    pub(super) const fn is_large(&self) -> bool {
+        self.is_large
+    }
+
     /// Has the processor bring a child that will be visited, unless the tree is so small that all of it is at
     /// hand.
     #[inline(always)]
@@ -152,12 +158,13 @@ impl Tree {
             return;
         }
         // Without branches: what is asked for next is told apart when it is visited. For the few children that are
-        // neither node nor triangles some node is brought, or none.
+        // neither node nor triangles some node is brought, or none; with a node, the beginning of the one after it.
         let index = (child.0 & Child::INDEX) as usize;
         let of_nodes = place(&self.nodes, index);
         let of_blocks = place(&self.blocks, index);
         let is_block = child.0 & Child::SPHERES == Child::TRIANGLES;
-        prefetch(std::hint::select_unpredictable(is_block, of_blocks, of_nodes));
+        const LONGER: usize = size_of::<TriangleBlock>();
+        prefetch::<LONGER>(std::hint::select_unpredictable(is_block, of_blocks, of_nodes));
     }
 
     /// Bytes held.

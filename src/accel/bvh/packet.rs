@@ -8,8 +8,8 @@
 
 use super::super::block::{LANES, RayBlock, lanes_of, lanes_where};
 use super::node::{Content, Node, Tree, WIDTH};
-use super::ray::{RaySetup, ShearRay};
-use super::simd::{Floats, Simd, Stack};
+use super::ray::{RaySetup, ShearRay, turned};
+use super::simd::{Floats, Simd, Sixteen, Stack};
 use super::traverse::{Found, Items, STACK, ask};
 
 /// The rays of a block whose directions have the same signs: the fields of [`RaySetup`], a lane each.
@@ -97,13 +97,45 @@ impl Packet {
                 [origin.least(), far_origin.greatest()]
             };
             let far = simd.load16(&packet.far[axis]);
-            packet.intervals[axis] =
-                [[ends[0], low, high], [ends[1], far.least(), far.greatest()]];
+            packet.intervals[axis] = [[ends[0], low, high], [ends[1], far.least(), far.greatest()]];
         }
         Some(packet)
     }
 
-    /// The ray of a lane, for triangles and spheres.
+    /// Calls `visit` with the rays of `lanes` for triangles, two at a time: of which lanes they are. One that is left
+    /// over is both.
+    #[inline(always)]
+    fn each_pair<S: Simd>(
+        &self,
+        simd: S,
+        lanes: u16,
+        mut visit: impl FnMut(ShearRay<S::F16>, [usize; 2]),
+    ) {
+        let mut left = lanes;
+        while left != 0 {
+            let a = left.trailing_zeros() as usize % LANES;
+            left &= left - 1;
+            let mut b = a;
+            let next = left.trailing_zeros() as usize % LANES;
+            if left != 0 && self.last[next] == self.last[a] {
+                b = next;
+                left &= left - 1;
+            }
+            let of = |values: &[f32; LANES]| simd.load16(values).halves(a, b);
+            let axes = turned([0, 1, 2], self.last[a]);
+            let [x, y, along] = &self.shear;
+            let ray = ShearRay {
+                origin: axes.map(|axis| of(&self.origin[axis])),
+                shear: [of(x), of(y)],
+                axes,
+                along: of(along),
+                t_min: of(&self.t_min),
+            };
+            visit(ray, [a, b]);
+        }
+    }
+
+    /// The ray of a lane, for spheres.
     #[inline(always)]
     fn shear_ray<S: Simd>(&self, simd: S, lane: usize) -> ShearRay<S::F8> {
         let of = |lanes: &[[f32; LANES]; 3]| [lanes[0][lane], lanes[1][lane], lanes[2][lane]];
@@ -137,6 +169,9 @@ impl Packet {
         // In a register, not in memory: what is written by lane cannot be read at once side by side.
         let mut t_max = simd.load16(&self.t_max);
         let mut furthest = t_max.greatest();
+        // Rays that run close together mostly meet all boxes that their intervals meet. So nodes are visited for that
+        // alone, but where it was in vain more often than not.
+        let mut in_vain = 0i32;
         let mut stack = Stack::<STACK>::new();
         let mut index = 0;
         loop {
@@ -150,7 +185,12 @@ impl Packet {
                 far = far.min(way.mul(c).max(way.mul(d)));
             }
             let mut bits = near.le(far);
-            if bits != 0 {
+            // One child alone need not wait on the stack.
+            let is_one = bits != 0 && bits & (bits - 1) == 0;
+            let mut next = is_one.then(|| index * WIDTH + bits.trailing_zeros() as usize);
+            if bits == 0 {
+                in_vain += 1;
+            } else if !is_one {
                 let near = near.to_array();
                 let start = stack.len();
                 while bits != 0 {
@@ -164,20 +204,32 @@ impl Packet {
             }
             // On to the next node, by way of leaves.
             index = loop {
-                let Some(entry) = stack.pop() else { return };
-                if f32::from_bits((entry >> 32) as u32) > furthest {
-                    continue;
-                }
-                let (parent, lane) = ((entry as u32) as usize / WIDTH, entry as usize % WIDTH);
-                let node = &tree.nodes[parent];
+                let slot = match next.take() {
+                    Some(slot) => slot,
+                    None => {
+                        let Some(entry) = stack.pop() else { return };
+                        if f32::from_bits((entry >> 32) as u32) > furthest {
+                            continue;
+                        }
+                        entry as u32 as usize
+                    }
+                };
+                let (node, lane) = (&tree.nodes[slot / WIDTH], slot % WIDTH);
                 let content = node.children[lane].content();
+                if let Content::Node(index) = content
+                    && in_vain <= 0
+                {
+                    break index;
+                }
                 let lanes = self.lanes_that_meet(simd, node, lane, t_max);
                 if lanes == 0 {
+                    in_vain += 1;
                     continue;
                 }
                 if let Content::Node(index) = content {
                     break index;
                 }
+                in_vain -= 1;
                 if visit(content, lanes, &mut t_max) {
                     furthest = t_max.greatest();
                     if furthest == f32::NEG_INFINITY {
@@ -213,6 +265,29 @@ impl Packet {
     }
 }
 
+/// What the rays of a packet hit, as [`Found`] has it, a lane each.
+pub(super) struct FoundLanes {
+    pub(super) t: [f32; LANES],
+    pub(super) u: [f32; LANES],
+    pub(super) v: [f32; LANES],
+    pub(super) id: [u32; LANES],
+    copy: [u32; LANES],
+}
+
+impl FoundLanes {
+    #[inline(always)]
+    pub(super) const fn get(&self, lane: usize) -> Found {
+        let Self { t, u, v, id, copy } = self;
+        Found { t: t[lane], u: u[lane], v: v[lane], id: id[lane], copy: copy[lane] }
+    }
+
+    #[inline(always)]
+    const fn set(&mut self, lane: usize, found: Found) {
+        (self.t[lane], self.u[lane], self.v[lane]) = (found.t, found.u, found.v);
+        (self.id[lane], self.copy[lane]) = (found.id, found.copy);
+    }
+}
+
 /// The closest hit of each ray, as [`super::traverse::closest`] finds it.
 #[inline(always)]
 pub(super) fn closest<S: Simd, const ROBUST: bool>(
@@ -221,7 +296,7 @@ pub(super) fn closest<S: Simd, const ROBUST: bool>(
     items: impl Items,
     block: &RayBlock,
     packet: &mut Packet,
-) -> [Found; LANES] {
+) -> FoundLanes {
     if tree.is_of_triangles {
         closest_in::<S, ROBUST, true>(simd, tree, items, block, packet)
     } else {
@@ -237,46 +312,66 @@ fn closest_in<S: Simd, const ROBUST: bool, const TRIANGLES: bool>(
     items: impl Items,
     block: &RayBlock,
     packet: &mut Packet,
-) -> [Found; LANES] {
-    let mut best = [Found::nothing(0.0); LANES];
-    for lane in lanes_of(packet.active) {
-        best[lane] = Found::nothing(packet.t_max[lane]);
-        for &item in &tree.endless {
-            ask(simd, items, item, &block.get(lane), &mut best[lane]);
+) -> FoundLanes {
+    let nothing = Found::nothing(0.0);
+    let mut best = FoundLanes {
+        t: packet.t_max,
+        u: [nothing.u; LANES],
+        v: [nothing.v; LANES],
+        id: [nothing.id; LANES],
+        copy: [nothing.copy; LANES],
+    };
+    if !tree.endless.is_empty() {
+        for lane in lanes_of(packet.active) {
+            let mut found = best.get(lane);
+            for &item in &tree.endless {
+                ask(simd, items, item, &block.get(lane), &mut found);
+            }
+            best.set(lane, found);
+            packet.t_max[lane] = found.t;
         }
-        packet.t_max[lane] = best[lane].t;
     }
     packet.traverse(simd, tree, |content, lanes, t_max| {
         let mut is_changed = false;
+        if let Content::Triangles(index) = content {
+            let block = &tree.blocks[index];
+            packet.each_pair(simd, lanes, |ray, [a, b]| {
+                let ends = t_max.halves(a, b);
+                ray.each_hit::<ROBUST>(block, ends, |i, hit| {
+                    let lane = if i < WIDTH { a } else { b };
+                    let found = Found::triangle(hit, block.ids[i % WIDTH]);
+                    if found.is_before(&best.get(lane)) {
+                        best.set(lane, found);
+                        items.foresee(found.id);
+                        *t_max = t_max.choose(1 << lane, simd.splat16(found.t));
+                        is_changed = true;
+                    }
+                    false
+                });
+            });
+            return is_changed;
+        }
         for lane in lanes_of(lanes) {
             let lane = lane % LANES;
-            let best = &mut best[lane];
-            let before = best.t;
+            let mut found = best.get(lane);
             match content {
-                Content::Triangles(index) => {
-                    let triangles = &tree.blocks[index];
-                    let ray = packet.shear_ray(simd, lane);
-                    ray.each_hit::<S, ROBUST>(simd, triangles, before, |i, hit| {
-                        let found = Found::triangle(hit, triangles.ids[i]);
-                        if found.is_before(best) {
-                            *best = found;
-                        }
-                        false
-                    });
-                }
                 Content::Spheres(index) if !TRIANGLES => {
                     let shear = packet.shear_ray(simd, lane);
-                    shear.closest_sphere(simd, &tree.spheres[index], &block.get(lane), best);
+                    shear.closest_sphere(simd, &tree.spheres[index], &block.get(lane), &mut found);
                 }
                 Content::Item(item) if !TRIANGLES => {
-                    ask(simd, items, item, &block.get(lane), best);
+                    ask(simd, items, item, &block.get(lane), &mut found);
                 }
-                Content::Node(_) | Content::Spheres(_) | Content::Item(_) => {}
+                Content::Node(_)
+                | Content::Triangles(_)
+                | Content::Spheres(_)
+                | Content::Item(_) => {}
             }
-            if best.t < before {
-                *t_max = t_max.choose(1 << lane, simd.splat16(best.t));
+            if found.t < best.t[lane] {
+                *t_max = t_max.choose(1 << lane, simd.splat16(found.t));
                 is_changed = true;
             }
+            best.set(lane, found);
         }
         is_changed
     });
@@ -320,18 +415,26 @@ fn any_in<S: Simd, const ROBUST: bool, const OPAQUE: bool, const TRIANGLES: bool
     }
     packet.traverse(simd, tree, |content, lanes, t_max| {
         let mut hits = 0;
-        for lane in lanes_of(lanes) {
+        if let Content::Triangles(index) = content {
+            let block = &tree.blocks[index];
+            packet.each_pair(simd, lanes, |ray, [a, b]| {
+                let ends = t_max.halves(a, b);
+                if OPAQUE {
+                    ray.each_hit::<ROBUST>(block, ends, |i, _| {
+                        let lane = if i < WIDTH { a } else { b };
+                        hits |= u16::from(!items.is_clear(block.ids[i % WIDTH])) << lane;
+                        false
+                    });
+                } else {
+                    let met = ray.meets_triangle::<ROBUST>(block, ends);
+                    hits |= u16::from(met & 0xff != 0) << a | u16::from(met >> 8 != 0) << b;
+                }
+            });
+        }
+        for lane in lanes_of(lanes).filter(|_| !TRIANGLES) {
             let lane = lane % LANES;
             let mut is_hit = false;
             match content {
-                Content::Triangles(index) => {
-                    let triangles = &tree.blocks[index];
-                    let ray = packet.shear_ray(simd, lane);
-                    ray.each_hit::<S, ROBUST>(simd, triangles, packet.t_max[lane], |i, _| {
-                        is_hit = !(OPAQUE && items.is_clear(triangles.ids[i]));
-                        is_hit
-                    });
-                }
                 Content::Spheres(index) if !TRIANGLES => {
                     let counts = |id| !(OPAQUE && items.is_clear(id));
                     let (shear, spheres) = (packet.shear_ray(simd, lane), &tree.spheres[index]);
@@ -340,7 +443,10 @@ fn any_in<S: Simd, const ROBUST: bool, const OPAQUE: bool, const TRIANGLES: bool
                 Content::Item(item) if !TRIANGLES => {
                     is_hit = items.occluded::<S, OPAQUE>(simd, item, &block.get(lane));
                 }
-                Content::Node(_) | Content::Spheres(_) | Content::Item(_) => {}
+                Content::Node(_)
+                | Content::Triangles(_)
+                | Content::Spheres(_)
+                | Content::Item(_) => {}
             }
             hits |= u16::from(is_hit) << lane;
         }

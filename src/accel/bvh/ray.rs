@@ -160,8 +160,8 @@ impl<F: Floats<Array = [f32; 8]>> LoneRay<F> {
             origin: [first, second, third].map(|axis| simd.splat8(o[axis])),
             shear: [simd.splat8(d[first] * along), simd.splat8(d[second] * along)],
             axes: [first, second, third],
-            along,
-            t_min,
+            along: simd.splat8(along),
+            t_min: simd.splat8(t_min),
         };
         Some(Self { slabs, shear, t_max })
     }
@@ -218,7 +218,7 @@ impl<F: Floats> SlabRay<F> {
 }
 
 /// The ray in every lane, against eight triangles or spheres: they are seen from its origin, and sheared so
-/// that it runs along an axis.
+/// that it runs along an axis. Or, in sixteen lanes, two rays for which that is the same axis.
 #[derive(Clone, Copy)]
 pub(super) struct ShearRay<F> {
     /// In the order of `axes`, of which the direction is longest along the last.
@@ -226,11 +226,11 @@ pub(super) struct ShearRay<F> {
     pub(super) shear: [F; 2],
     pub(super) axes: [usize; 3],
     /// Length along the last axis to distance.
-    pub(super) along: f32,
-    pub(super) t_min: f32,
+    pub(super) along: F,
+    pub(super) t_min: F,
 }
 
-impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
+impl<F: Floats> ShearRay<F> {
     /// By the parts of a [`RaySetup`].
     #[inline(always)]
     pub(super) fn of<S: Simd<F8 = F>>(
@@ -244,15 +244,15 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
             origin: turned(origin, last).map(|o| simd.splat8(o)),
             shear: [simd.splat8(x), simd.splat8(y)],
             axes: turned([0, 1, 2], last),
-            along,
-            t_min,
+            along: simd.splat8(along),
+            t_min: simd.splat8(t_min),
         }
     }
 
     /// Points as seen from the origin. They are given by coordinate, in the order of `axes`.
     #[inline(always)]
-    pub(super) fn seen<S: Simd<F8 = F>>(&self, simd: S, points: [&[f32; 8]; 3]) -> [F; 3] {
-        let [x, y, z] = points.map(|p| simd.load8(p));
+    pub(super) fn seen(&self, points: [&[f32; 8]; 3]) -> [F; 3] {
+        let [x, y, z] = points.map(|p| self.along.eights(p));
         [x.sub(self.origin[0]), y.sub(self.origin[1]), z.sub(self.origin[2])]
     }
 
@@ -305,7 +305,9 @@ mod tests {
         assert_eq!(shear.axes, turns.axes);
         same(&first(shear.origin), &first(turns.origin));
         same(&shear.shear.map(|f| f.to_array()[0]), &turns.shear.map(|f| f.to_array()[0]));
-        same(&[shear.along, shear.t_min, t_max], &[turns.along, turns.t_min, setup.t_max]);
+        same(&shear.along.to_array(), &turns.along.to_array());
+        same(&shear.t_min.to_array(), &turns.t_min.to_array());
+        same(&[t_max], &[setup.t_max]);
         same(&[slabs.t_min.to_array()[0]], &[setup.t_min]);
         true
     }

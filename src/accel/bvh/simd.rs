@@ -14,6 +14,10 @@ pub(super) trait Floats: Copy {
     type Array: AsRef<[f32]> + Copy;
 
     fn to_array(self) -> Self::Array;
+    /// A number in every lane, as many as `self` has.
+    fn all(self, x: f32) -> Self;
+    /// Eight numbers, as often as there are lanes for them.
+    fn eights(self, x: &[f32; 8]) -> Self;
     fn add(self, b: Self) -> Self;
     fn sub(self, b: Self) -> Self;
     fn mul(self, b: Self) -> Self;
@@ -39,10 +43,16 @@ pub(super) trait Floats: Copy {
     fn greatest(self) -> f32;
 }
 
+/// Lanes of sixteen floats.
+pub(super) trait Sixteen: Floats<Array = [f32; 16]> {
+    /// Lane `a` in the first eight lanes, lane `b` in the others.
+    fn halves(self, a: usize, b: usize) -> Self;
+}
+
 /// An instruction set.
 pub(super) trait Simd: Copy {
     type F8: Floats<Array = [f32; 8]>;
-    type F16: Floats<Array = [f32; 16]>;
+    type F16: Sixteen;
 
     fn splat8(self, x: f32) -> Self::F8;
     fn load8(self, x: &[f32; 8]) -> Self::F8;
@@ -129,6 +139,16 @@ impl<const N: usize> Floats for Lanes<N> {
     }
 
     #[inline(always)]
+    fn all(self, x: f32) -> Self {
+        Self([x; N])
+    }
+
+    #[inline(always)]
+    fn eights(self, x: &[f32; 8]) -> Self {
+        Self(std::array::from_fn(|i| x[i % 8]))
+    }
+
+    #[inline(always)]
     fn add(self, b: Self) -> Self {
         self.zip(b, |a, b| a + b)
     }
@@ -204,6 +224,13 @@ impl<const N: usize> Floats for Lanes<N> {
     }
 }
 
+impl Sixteen for Lanes<16> {
+    #[inline(always)]
+    fn halves(self, a: usize, b: usize) -> Self {
+        Self(std::array::from_fn(|i| self.0[if i < 8 { a } else { b }]))
+    }
+}
+
 impl Simd for Portable {
     type F8 = Lanes<8>;
     type F16 = Lanes<16>;
@@ -245,6 +272,16 @@ impl<F: Floats<Array = [f32; 8]>> Floats for Pair<F> {
     fn to_array(self) -> [f32; 16] {
         let (a, b) = (self.0.to_array(), self.1.to_array());
         std::array::from_fn(|i| if i < 8 { a[i] } else { b[i - 8] })
+    }
+
+    #[inline(always)]
+    fn all(self, x: f32) -> Self {
+        Self(self.0.all(x), self.1.all(x))
+    }
+
+    #[inline(always)]
+    fn eights(self, x: &[f32; 8]) -> Self {
+        Self(self.0.eights(x), self.1.eights(x))
     }
 
     #[inline(always)]
@@ -323,6 +360,14 @@ impl<F: Floats<Array = [f32; 8]>> Floats for Pair<F> {
     }
 }
 
+impl<F: Floats<Array = [f32; 8]>> Sixteen for Pair<F> {
+    #[inline(always)]
+    fn halves(self, a: usize, b: usize) -> Self {
+        let lanes = self.to_array();
+        Self(self.0.all(lanes[a % 16]), self.1.all(lanes[b % 16]))
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 pub(super) use x86::{Avx2, Avx512};
 
@@ -330,7 +375,7 @@ pub(super) use x86::{Avx2, Avx512};
 mod x86 {
     use std::arch::x86_64::*;
 
-    use super::{Floats, Kernel, Pair, Simd};
+    use super::{Floats, Kernel, Pair, Simd, Sixteen};
 
     /// AVX2, fused multiply-add and the counting of bits that came with them; a value of it is the proof
     /// that the processor has all of them.
@@ -364,7 +409,7 @@ mod x86 {
 
     /// Declares lanes held in a register, and their arithmetic.
     macro_rules! lanes {
-        ($name:ident($register:ty) of $n:literal, $proof:literal: $store:ident, $add:ident, $sub:ident,
+        ($name:ident($register:ty) of $n:literal, $proof:literal: $store:ident, $splat:ident, |$eight:ident| $repeat:expr, $add:ident, $sub:ident,
          $mul:ident, $div:ident, $mul_add:ident, $mul_sub:ident, $neg_mul_add:ident, $min:ident, $max:ident,
          $sqrt:ident, |$a:ident, $b:ident| $le:expr, $lt:expr, |$bits:ident| $choose:expr,
          |$lanes:ident| $least:expr, $greatest:expr) => {
@@ -381,6 +426,19 @@ mod x86 {
                     // SAFETY: `self` proves the instruction set; the array is as long as the register.
                     unsafe { $store(array.as_mut_ptr(), self.0) };
                     array
+                }
+
+                #[inline(always)]
+                fn all(self, x: f32) -> Self {
+                    // SAFETY: `self` proves the instruction set.
+                    Self(unsafe { $splat(x) })
+                }
+
+                #[inline(always)]
+                fn eights(self, $eight: &[f32; 8]) -> Self {
+                    // SAFETY: `self` proves the instruction set; eight floats are read, and the load needs no
+                    // alignment.
+                    Self(unsafe { $repeat })
                 }
 
                 lanes!(@binary add $add, sub $sub, mul $mul, div $div, min $min, max $max);
@@ -467,19 +525,32 @@ mod x86 {
         _mm256_castsi256_ps(_mm256_cmpeq_epi32(of_lane, each))
     }
 
-    lanes!(Avx8(__m256) of 8, "[`Avx2`]": _mm256_storeu_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps,
+    lanes!(Avx8(__m256) of 8, "[`Avx2`]": _mm256_storeu_ps, _mm256_set1_ps, |x| _mm256_loadu_ps(x.as_ptr()), _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps,
         _mm256_div_ps, _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_fnmadd_ps, _mm256_min_ps, _mm256_max_ps,
         _mm256_sqrt_ps, |a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32,
         _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) as u32,
         |bits| _mm256_blendv_ps(a, b, lane_mask(bits)),
         |v| across!(v: _mm_min_ps), across!(v: _mm_max_ps));
 
-    lanes!(Avx16(__m512) of 16, "[`Avx512`]": _mm512_storeu_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps,
+    lanes!(Avx16(__m512) of 16, "[`Avx512`]": _mm512_storeu_ps, _mm512_set1_ps,
+        |x| _mm512_castpd_ps(_mm512_broadcast_f64x4(_mm256_castps_pd(_mm256_loadu_ps(x.as_ptr())))), _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps,
         _mm512_div_ps, _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_fnmadd_ps, _mm512_min_ps, _mm512_max_ps,
         _mm512_sqrt_ps, |a, b| u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)),
         u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b)),
         |bits| _mm512_mask_blend_ps(bits as u16, a, b),
         |v| across!(halves(v): _mm256_min_ps, _mm_min_ps), across!(halves(v): _mm256_max_ps, _mm_max_ps));
+
+    impl Sixteen for Avx16 {
+        #[inline(always)]
+        fn halves(self, a: usize, b: usize) -> Self {
+            // SAFETY: `self` proves the instruction set; of an index the last four bits count.
+            Self(unsafe {
+                let (a, b) = (_mm256_set1_epi32(a as i32), _mm256_set1_epi32(b as i32));
+                let lanes = _mm512_inserti64x4::<1>(_mm512_castsi256_si512(a), b);
+                _mm512_permutexvar_ps(lanes, self.0)
+            })
+        }
+    }
 
     impl Simd for Avx2 {
         type F8 = Avx8;
@@ -570,11 +641,11 @@ pub(super) const fn place<T>(values: &[T], index: usize) -> Place {
     values.as_ptr().wrapping_add(index).cast()
 }
 
-/// Has the processor bring the 256 bytes from an address on to its first cache, while something else goes on.
+/// Has the processor bring the `BYTES` from an address on to its first cache, while something else goes on.
 #[inline(always)]
-pub(super) fn prefetch(address: Place) {
+pub(super) fn prefetch<const BYTES: usize>(address: Place) {
     #[cfg(target_arch = "x86_64")]
-    for line in (0..256).step_by(64) {
+    for line in (0..BYTES).step_by(64) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         let address = address.wrapping_add(line);
         // SAFETY: every x86-64 processor has the instruction, which reads nothing that a program could see and

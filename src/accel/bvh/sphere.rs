@@ -54,7 +54,7 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
         block: &SphereBlock,
         t_max: f32,
     ) -> (u32, [f32; WIDTH]) {
-        let [x, y, z] = self.seen(simd, self.axes.map(|axis| &block.rounded[axis]));
+        let [x, y, z] = self.seen(self.axes.map(|axis| &block.rounded[axis]));
         let [across_x, across_y, _] = self.sheared([x, y, z]);
         let [shear_x, shear_y] = self.shear;
         let third = across_x.mul_sub(shear_y, across_y.mul(shear_x));
@@ -68,14 +68,13 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
             .add(distance.mul(simd.splat8(OFF)));
         let inside = e.mul_sub(larger, passes);
         // Where along the ray the centre is, and how far from there the sphere reaches at most.
-        let along = simd.splat8(self.along).div(e);
+        let along = self.along.div(e);
         let middle = x.mul_add(shear_x, y.mul_add(shear_y, z)).mul(along);
         let zero = simd.splat8(0.0);
         let half = inside.max(zero).sqrt().mul(along.max(zero.sub(along)));
         let (enter, exit) = (middle.sub(half), middle.add(half));
         // What is not a number may be hit.
-        let passed =
-            inside.le(zero) | exit.le(simd.splat8(self.t_min)) | simd.splat8(t_max).le(enter);
+        let passed = inside.le(zero) | exit.le(self.t_min) | simd.splat8(t_max).le(enter);
         (!passed & ((1 << WIDTH) - 1), enter.to_array())
     }
 

@@ -6,10 +6,10 @@ use super::BvhAccel;
 use super::node::Child;
 #[cfg(target_arch = "x86_64")]
 use super::simd::{Avx2, Avx512};
-use super::simd::{Floats, Isa, Portable, Simd};
+use super::simd::{Floats, Isa, Portable, Simd, Sixteen};
 use crate::accel::{
-    AccelError, BruteForce, BuildOptions, Geometry, Group, Hit, InstanceSet, Precision, RayQuery,
-    World, rows_from_affine,
+    AccelError, BruteForce, BuildOptions, Geometry, Group, Hit, InstanceSet, LANES, Precision,
+    RayBlock, RayQuery, World, rows_from_affine,
 };
 use crate::geometry::{Plane, Sphere, TriangleMesh};
 use crate::math::Ray;
@@ -50,6 +50,13 @@ fn check<F: Floats<Array = [f32; N]>, const N: usize>(load: impl Fn(&[f32; N]) -
         assert_eq!(x.le(x), (1 << N) - 1);
         assert_eq!(x.lt(y), (0..N).fold(0, |bits, i| bits | u32::from(a[i] < b[i]) << i));
         assert_eq!(x.lt(x), 0);
+        let bits = le.rotate_left(3) & ((1 << N) - 1);
+        same(x.choose(bits, y), &|i| if bits >> i & 1 == 1 { b[i] } else { a[i] });
+        assert_eq!(x.least(), a.into_iter().fold(f32::INFINITY, f32::min));
+        assert_eq!(x.greatest(), a.into_iter().fold(f32::NEG_INFINITY, f32::max));
+        same(x.all(c[1]), &|_| c[1]);
+        let eight = std::array::from_fn(|i| c[i]);
+        same(x.eights(&eight), &|i| c[i % 8]);
     }
     let nan = load(&[f32::NAN; N]);
     assert_eq!((nan.le(nan), nan.lt(nan)), (0, 0));
@@ -60,6 +67,11 @@ fn check_isa(simd: impl Simd) {
     check(|x| simd.load16(x));
     assert_eq!(simd.splat8(2.5).to_array(), [2.5; 8]);
     assert_eq!(simd.splat16(2.5).to_array(), [2.5; 16]);
+    let numbers = std::array::from_fn(|i| i as f32);
+    for (a, b) in (0..16).flat_map(|a| (0..16).map(move |b| (a, b))) {
+        let expected = std::array::from_fn(|i| if i < 8 { a as f32 } else { b as f32 });
+        assert_eq!(simd.load16(&numbers).halves(a, b).to_array(), expected);
+    }
 }
 
 /// Each instruction set that the processor has.
@@ -75,6 +87,17 @@ fn lanes_do_what_numbers_do() {
             check_isa(avx512);
         }
     }
+}
+
+/// All instruction sets that there are here.
+fn isas() -> Vec<Isa> {
+    let mut all = vec![Isa::Portable(Portable)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        all.extend(Avx2::detect().map(Isa::Avx2));
+        all.extend(Avx512::detect().map(Isa::Avx512));
+    }
+    all
 }
 
 fn world(mesh: TriangleMesh) -> World {
@@ -142,6 +165,71 @@ fn hits_are_the_oracles_at_any_scale() {
                 assert!((e.t - h.t).abs() < 2e-5, "{scale} {offset}: {e:?} {h:?}");
                 assert!(accel.occluded(&ray));
             }
+        }
+    }
+}
+
+/// Of several rays at once each has the answer that it has alone, to the last bit: through a mesh by itself, two of
+/// them, and spheres between; rays that run together and that spread, with several longest axes, at vertices and
+/// along edges, with lanes left out and with ends.
+#[test]
+fn packets_are_as_their_rays() {
+    let n = 40;
+    let one = || Geometry::Mesh(field(n, 1.0, Vec3::ZERO));
+    let balls: Vec<_> = (0..30)
+        .map(|i| Sphere {
+            center: DVec3::new(f64::from(i % 6) * 0.3 - 0.8, 0.3, f64::from(i / 6) * 0.4 - 0.8),
+            radius: 0.1,
+        })
+        .collect();
+    let other = field(9, 0.7, Vec3::new(0.1, -0.2, 0.05));
+    let geometries = [
+        vec![one()],
+        vec![one(), Geometry::Mesh(other)],
+        vec![one(), Geometry::Shapes(balls.into())],
+    ];
+    for geometries in geometries {
+        let world = World { root: Group { geometries, ..Group::default() }, ..World::default() };
+        for isa in isas() {
+            let accel = built(&world, Some(isa), None);
+            let mut next = numbers(5);
+            let (mut hit, mut missed, mut packets) = (0, 0, 0);
+            for round in 0..1500 {
+                let spread = [0.02, 0.3, 1.0][round % 3];
+                let mut any = |by: f32| Vec3::new(next(), next(), next()) * by;
+                // Of all lengths along the axes, or much the same along two.
+                let forward = [any(1.0), Vec3::new(0.7, -0.7, 0.1), Vec3::NEG_Y][round / 3 % 3];
+                let eye = -2.0 * forward + any(0.3);
+                let mut block = RayBlock::empty();
+                for lane in (0..LANES).filter(|lane| round % 5 == 0 || (round * lane) % 4 != 1) {
+                    let mut target = any(spread);
+                    if round % 7 == 0 {
+                        // At a vertex, or along an edge of the grid.
+                        let cell = ((target + 1.0) * 0.5 * n as f32).round();
+                        let at = 2.0 * cell / n as f32 - 1.0;
+                        target =
+                            Vec3::new(at.x, 0.2 * (7.0 * at.x).sin() * (5.0 * at.z).cos(), at.z);
+                    }
+                    let origin = if round % 2 == 0 { eye } else { eye + any(spread) };
+                    let t_max = if lane % 6 == 5 { 1.0 } else { f32::INFINITY };
+                    block.set(lane, &Ray { t_max, ..Ray::new(origin, target - origin) });
+                }
+                let (hits, occluded) =
+                    (accel.intersect_block(&block), accel.occluded_block(&block));
+                let by_opaque = accel.occluded_by_opaque_block(&block);
+                packets += usize::from(hits.lanes() != 0);
+                for lane in 0..LANES {
+                    let (ray, is_active) = (block.get(lane), block.active() >> lane & 1 == 1);
+                    let expected = accel.intersect(&ray).filter(|_| is_active);
+                    assert_eq!(hits.get(lane), expected, "{isa:?}, {round}: {ray:?}");
+                    for bits in [occluded, by_opaque] {
+                        assert_eq!(bits >> lane & 1 == 1, expected.is_some(), "{isa:?}, {round}");
+                    }
+                    hit += usize::from(expected.is_some());
+                    missed += usize::from(is_active && expected.is_none());
+                }
+            }
+            assert!(hit > 5000 && missed > 2000 && packets > 800, "{hit} {missed} {packets}");
         }
     }
 }

@@ -26,11 +26,13 @@ pub(super) struct Found {
 
 impl Found {
     pub(super) const NO_COPY: u32 = !0;
+    /// The number of none.
+    pub(super) const NOTHING: u32 = u32::MAX;
 
     /// None yet at t ≤ `t_max`: any comes before it.
     #[inline(always)]
     pub(super) const fn nothing(t_max: f32) -> Self {
-        Self { t: t_max, u: 0.0, v: 0.0, id: u32::MAX, copy: u32::MAX }
+        Self { t: t_max, u: 0.0, v: 0.0, id: Self::NOTHING, copy: u32::MAX }
     }
 
     #[inline(always)]
@@ -47,7 +49,7 @@ impl Found {
 
     #[inline(always)]
     pub(super) fn if_any(self) -> Option<Self> {
-        (self.id != u32::MAX).then_some(self)
+        (self.id != Self::NOTHING).then_some(self)
     }
 
     /// Whether it comes before `other`. What is equally far is told apart by number: so neither the order
@@ -68,6 +70,9 @@ pub(super) trait Items: Copy {
 
     /// Whether light passes a primitive without loss.
     fn is_clear(self, id: u32) -> bool;
+
+    /// Has the processor bring what will be asked of a triangle, which was hit and perhaps is the closest.
+    fn foresee(self, id: u32);
 }
 
 /// A child that is yet to be visited, and where the ray enters it: the nearer, the smaller the number.
@@ -132,9 +137,8 @@ fn closest_in<S: Simd, const ROBUST: bool, const TRIANGLES: bool>(
             }
             Content::Triangles(index) => {
                 let block = &tree.blocks[index];
-                let before = best.t;
-                shear.each_hit::<S, ROBUST>(simd, block, before, |lane, hit| {
-                    let found = Found::triangle(hit, block.ids[lane]);
+                shear.each_hit::<ROBUST>(block, t_far, |lane, hit| {
+                    let found = Found::triangle(hit, block.ids[lane % WIDTH]);
                     if found.is_before(&best) {
                         best = found;
                     }
@@ -281,10 +285,14 @@ fn any_in<S: Simd, const ROBUST: bool, const OPAQUE: bool, const TRIANGLES: bool
             Content::Triangles(index) => {
                 let block = &tree.blocks[index];
                 let mut is_hit = false;
-                shear.each_hit::<S, ROBUST>(simd, block, t_max, |lane, _| {
-                    is_hit = !(OPAQUE && items.is_clear(block.ids[lane]));
-                    is_hit
-                });
+                if OPAQUE {
+                    shear.each_hit::<ROBUST>(block, t_far, |lane, _| {
+                        is_hit = !items.is_clear(block.ids[lane % WIDTH]);
+                        is_hit
+                    });
+                } else {
+                    is_hit = shear.meets_triangle::<ROBUST>(block, t_far) != 0;
+                }
                 if is_hit {
                     return true;
                 }

@@ -1,4 +1,4 @@
-//! One ray against eight triangles.
+//! One ray against eight triangles, or two.
 //!
 //! Source: Woop, Benthin, Wald, *Watertight ray/triangle intersection*, JCGT 2(1), 2013. Corners are seen
 //! from the ray's origin and sheared so that the ray runs along an axis; edge functions are then areas in
@@ -9,7 +9,7 @@
 
 use super::node::TriangleBlock;
 use super::ray::ShearRay;
-use super::simd::{Floats, Simd};
+use super::simd::Floats;
 
 /// Where one triangle is hit.
 #[derive(Debug, Clone, Copy)]
@@ -30,21 +30,29 @@ struct Candidates<F> {
     sheared: [[F; 3]; 3],
 }
 
-impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
+/// Where a ray hits them.
+struct Within<F> {
+    /// Lanes, but for those of `unclear`.
+    bits: u32,
+    /// Lanes in which f32 does not tell.
+    unclear: u32,
+    t: F,
+    /// One by the sum of the edge functions.
+    inverse: F,
+}
+
+// A ray in eight lanes, or two of them in sixteen: then lane i is triangle i mod 8.
+impl<F: Floats> ShearRay<F> {
     #[inline(always)]
-    fn candidates<S: Simd<F8 = F>, const ROBUST: bool>(
-        &self,
-        simd: S,
-        block: &TriangleBlock,
-    ) -> Candidates<F> {
+    fn candidates<const ROBUST: bool>(&self, block: &TriangleBlock) -> Candidates<F> {
         let [xs, ys, zs] = self.axes.map(|axis| &block.corners[axis]);
-        let [ax, ay, az] = self.sheared(self.seen(simd, [&xs[0], &ys[0], &zs[0]]));
-        let [bx, by, bz] = self.sheared(self.seen(simd, [&xs[1], &ys[1], &zs[1]]));
-        let [cx, cy, cz] = self.sheared(self.seen(simd, [&xs[2], &ys[2], &zs[2]]));
+        let [ax, ay, az] = self.sheared(self.seen([&xs[0], &ys[0], &zs[0]]));
+        let [bx, by, bz] = self.sheared(self.seen([&xs[1], &ys[1], &zs[1]]));
+        let [cx, cy, cz] = self.sheared(self.seen([&xs[2], &ys[2], &zs[2]]));
         let u = cross::<F, ROBUST>(cx, cy, bx, by);
         let v = cross::<F, ROBUST>(ax, ay, cx, cy);
         let w = cross::<F, ROBUST>(bx, by, ax, ay);
-        let zero = simd.splat8(0.0);
+        let zero = u.all(0.0);
         let bits = zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero);
         Candidates {
             bits,
@@ -54,59 +62,106 @@ impl<F: Floats<Array = [f32; 8]>> ShearRay<F> {
         }
     }
 
+    /// Those at t in (`t_min`, `t_max`].
+    #[inline(always)]
+    fn within<const ROBUST: bool>(&self, candidates: &Candidates<F>, t_max: F) -> Within<F> {
+        let Candidates { bits, edges: [u, v, w], sum, sheared: [_, _, [az, bz, cz]] } = *candidates;
+        let (zero, inverse) = (sum.all(0.0), sum.all(1.0).div(sum));
+        let t = u.mul_add(az, v.mul_add(bz, w.mul(cz))).mul(inverse).mul(self.along);
+        Within {
+            // Where the sum is zero t is not a number, which is in no interval.
+            bits: bits & self.t_min.lt(t) & t.le(t_max),
+            unclear: if ROBUST { bits & zero.le(sum) & sum.le(zero) } else { 0 },
+            t,
+            inverse,
+        }
+    }
+
     /// Calls `found` with every triangle hit at t in (`t_min`, `t_max`], until it returns true.
     #[inline(always)]
-    pub(super) fn each_hit<S: Simd<F8 = F>, const ROBUST: bool>(
+    pub(super) fn each_hit<const ROBUST: bool>(
         &self,
-        simd: S,
         block: &TriangleBlock,
-        t_max: f32,
+        t_max: F,
         mut found: impl FnMut(usize, TriangleHit) -> bool,
     ) {
-        let candidates = self.candidates::<S, ROBUST>(simd, block);
+        let candidates = self.candidates::<ROBUST>(block);
         if candidates.bits == 0 {
             return;
         }
-        let Candidates { mut bits, edges: [u, v, w], sum, sheared } = candidates;
-        let [az, bz, cz] = sheared[2];
-        let inverse = simd.splat8(1.0).div(sum);
-        let t = u.mul_add(az, v.mul_add(bz, w.mul(cz))).mul(inverse).mul(simd.splat8(self.along));
-        // What is not a number stays: it is asked again.
-        let is_outside = t.le(simd.splat8(self.t_min)) | simd.splat8(t_max).lt(t);
-        bits &= !is_outside;
+        let Within { mut bits, unclear, t, inverse } = self.within::<ROBUST>(&candidates, t_max);
+        // Apart from the others: for those nothing has to be written to memory.
+        if unclear != 0 && self.each_unclear(&candidates, unclear, t_max, &mut found) {
+            return;
+        }
         if bits == 0 {
             return;
         }
-        let is_inside = |t: f32| t > self.t_min && t <= t_max;
-        let zero = simd.splat8(0.0);
-        let mut unclear = if ROBUST { bits & zero.le(sum) & sum.le(zero) } else { 0 };
-        if unclear != 0 {
-            // Apart from the others: for those nothing has to be written to memory.
-            bits &= !unclear;
-            let sheared = sheared.map(|axis| axis.map(F::to_array));
-            while unclear != 0 {
-                let lane = unclear.trailing_zeros() as usize & 7;
-                unclear &= unclear - 1;
-                let corners = sheared.map(|axis| axis.map(|lanes| lanes[lane]));
-                if let Some(hit) = exact_hit(&corners, self.along)
-                    && is_inside(hit.t)
-                    && found(lane, hit)
-                {
-                    return;
-                }
-            }
-        }
-        let (us, vs) = (v.mul(inverse).to_array(), w.mul(inverse).to_array());
-        let ts = t.to_array();
+        let [_, v, w] = candidates.edges;
+        let [t, u, v] = [t, v.mul(inverse), w.mul(inverse)].map(F::to_array);
         while bits != 0 {
-            let lane = bits.trailing_zeros() as usize & 7;
+            let lane = bits.trailing_zeros() as usize;
             bits &= bits - 1;
-            let hit = TriangleHit { t: ts[lane], u: us[lane], v: vs[lane] };
-            if is_inside(hit.t) && found(lane, hit) {
+            let [t, u, v] = [&t, &u, &v].map(|lanes| at(lanes, lane));
+            if found(lane, TriangleHit { t, u, v }) {
                 return;
             }
         }
     }
+
+    /// The lanes with a triangle hit at t in (`t_min`, `t_max`], as bits.
+    #[inline(always)]
+    pub(super) fn meets_triangle<const ROBUST: bool>(
+        &self,
+        block: &TriangleBlock,
+        t_max: F,
+    ) -> u32 {
+        let candidates = self.candidates::<ROBUST>(block);
+        if candidates.bits == 0 {
+            return 0;
+        }
+        let Within { mut bits, unclear, .. } = self.within::<ROBUST>(&candidates, t_max);
+        if unclear != 0 {
+            self.each_unclear(&candidates, unclear, t_max, &mut |lane, _| {
+                bits |= 1 << lane;
+                false
+            });
+        }
+        bits
+    }
+
+    /// Asks lanes in f64; whether `found` returned true, which ends it.
+    #[inline(always)]
+    fn each_unclear(
+        &self,
+        candidates: &Candidates<F>,
+        mut bits: u32,
+        t_max: F,
+        found: &mut impl FnMut(usize, TriangleHit) -> bool,
+    ) -> bool {
+        let sheared = candidates.sheared.map(|axis| axis.map(F::to_array));
+        let [along, t_min, t_max] = [self.along, self.t_min, t_max].map(F::to_array);
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let corners = sheared.map(|axis| axis.map(|lanes| at(&lanes, lane)));
+            if let Some(hit) = exact_hit(&corners, at(&along, lane))
+                && hit.t > at(&t_min, lane)
+                && hit.t <= at(&t_max, lane)
+                && found(lane, hit)
+            {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// What is in a lane.
+#[inline(always)]
+fn at(lanes: &impl AsRef<[f32]>, lane: usize) -> f32 {
+    let lanes = lanes.as_ref();
+    lanes[lane % lanes.len()]
 }
 
 /// Twice the area that two corners span with the ray. Source: Jeannerod, Louvet, Muller, *Further analysis

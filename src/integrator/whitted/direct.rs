@@ -6,19 +6,16 @@
 
 use super::super::RayCounts;
 use crate::accel::{LANES, RayBlock, lanes_of, lanes_where};
-use crate::color::Rgb;
+use crate::color::{Rgb, RgbLanes};
 use crate::light::{Light, PointLight};
 use crate::math::Vec3Lanes;
 use crate::scene::{Scene, SurfaceBlock};
-
-/// Colours side by side, by component.
-pub(super) type RgbLanes = [[f32; LANES]; 3];
 
 /// The light that arrives from one lamp, by lane.
 struct Arriving {
     direction: Vec3Lanes<LANES>,
     distance: [f32; LANES],
-    irradiance: RgbLanes,
+    irradiance: RgbLanes<LANES>,
     /// Where any does.
     lanes: u16,
 }
@@ -26,7 +23,7 @@ struct Arriving {
 /// What the materials of a block leave of light.
 struct Looks {
     /// Reflectance of those that scatter as Lambert's law says; black elsewhere.
-    lambertian: RgbLanes,
+    lambertian: RgbLanes<LANES>,
     /// Lanes of other materials that are lit.
     others: u16,
     /// Of all that are lit.
@@ -42,8 +39,8 @@ pub(super) fn direct_light(
     points: &SurfaceBlock,
     counts: &mut RayCounts,
     blocked: impl Fn(&RayBlock) -> u16,
-) -> RgbLanes {
-    let mut radiance = [[0.0; LANES]; 3];
+) -> RgbLanes<LANES> {
+    let mut radiance = RgbLanes::BLACK;
     let looks = looks(scene, points, &mut radiance);
     for light in scene.lights.iter().filter(|_| looks.lit != 0) {
         let arriving = arriving(light, points, looks.lit);
@@ -61,7 +58,7 @@ pub(super) fn direct_light(
                 lanes,
             ));
         }
-        for (sum, light) in radiance.iter_mut().zip(&light) {
+        for (sum, light) in radiance.0.iter_mut().zip(&light.0) {
             for i in 0..LANES {
                 sum[i] += if passes >> i & 1 == 1 { light[i] } else { 0.0 };
             }
@@ -72,21 +69,36 @@ pub(super) fn direct_light(
 
 /// What is lit and how; their ambient light is added to `radiance`.
 #[inline]
-fn looks(scene: &Scene, points: &SurfaceBlock, radiance: &mut RgbLanes) -> Looks {
-    let mut looks = Looks { lambertian: [[0.0; LANES]; 3], others: 0, lit: 0 };
-    for lane in lanes_of(points.hit()) {
-        let material = points.material(scene, lane);
+fn looks(scene: &Scene, points: &SurfaceBlock, radiance: &mut RgbLanes<LANES>) -> Looks {
+    let mut looks = Looks { lambertian: RgbLanes::BLACK, others: 0, lit: 0 };
+    // Material by material: mostly there is but one.
+    let mut left = points.hit();
+    while left != 0 {
+        let first = left.trailing_zeros() as usize % LANES;
+        let lanes = points.lanes_like(first) & left;
+        left &= !lanes;
+        let material = points.material(scene, first);
         if !material.is_lit() {
             continue;
         }
-        looks.lit |= 1 << lane;
-        let ambient = (material.ambient() * scene.ambient).to_array();
+        looks.lit |= lanes;
         let lambertian = material.lambertian();
-        looks.others |= u16::from(lambertian.is_none()) << lane;
-        let reflectance = lambertian.unwrap_or(Rgb::BLACK).to_array();
+        looks.others |= if lambertian.is_none() { lanes } else { 0 };
+        let ambient = material.ambient() * scene.ambient;
+        let reflectance = lambertian.unwrap_or(Rgb::BLACK);
+        if lanes == points.hit() {
+            *radiance = RgbLanes::splat(ambient);
+            looks.lambertian = RgbLanes::splat(reflectance);
+            break;
+        }
+        let (ambient, reflectance) = (ambient.to_array(), reflectance.to_array());
         for c in 0..3 {
-            radiance[c][lane] = ambient[c];
-            looks.lambertian[c][lane] = reflectance[c];
+            for i in 0..LANES {
+                let is_of_it = lanes >> i & 1 == 1;
+                radiance.0[c][i] = if is_of_it { ambient[c] } else { radiance.0[c][i] };
+                let own = looks.lambertian.0[c][i];
+                looks.lambertian.0[c][i] = if is_of_it { reflectance[c] } else { own };
+            }
         }
     }
     looks
@@ -98,7 +110,7 @@ fn arriving(light: &Light, points: &SurfaceBlock, lanes: u16) -> Arriving {
     let alike = |direction, distance, irradiance: Rgb| Arriving {
         direction: Vec3Lanes::splat(direction),
         distance: [distance; LANES],
-        irradiance: irradiance.to_array().map(|c| [c; LANES]),
+        irradiance: RgbLanes::splat(irradiance),
         lanes,
     };
     if let Light::Directional(sun) = light {
@@ -113,9 +125,7 @@ fn arriving(light: &Light, points: &SurfaceBlock, lanes: u16) -> Arriving {
         arriving.lanes |= 1 << lane;
         arriving.direction.set(lane, sample.direction);
         arriving.distance[lane] = sample.distance;
-        for (c, value) in sample.irradiance.to_array().into_iter().enumerate() {
-            arriving.irradiance[c][lane] = value;
-        }
+        arriving.irradiance.set(lane, sample.irradiance);
     }
     arriving
 }
@@ -126,14 +136,13 @@ fn arriving(light: &Light, points: &SurfaceBlock, lanes: u16) -> Arriving {
 fn arriving_from(light: &PointLight, positions: &Vec3Lanes<LANES>, lanes: u16) -> Arriving {
     let mut direction = Vec3Lanes::ZERO;
     let mut distance = [0.0; LANES];
-    let mut irradiance = [[0.0; LANES]; 3];
+    let mut irradiance = RgbLanes::BLACK;
     let mut is_any = [false; LANES];
     for i in 0..LANES {
         let (sample, any) = light.sample_always(positions.get(i).as_dvec3());
         direction.set(i, sample.direction);
         distance[i] = sample.distance;
-        let Rgb { r, g, b } = sample.irradiance;
-        (irradiance[0][i], irradiance[1][i], irradiance[2][i]) = (r, g, b);
+        irradiance.set(i, sample.irradiance);
         is_any[i] = any;
     }
     Arriving { direction, distance, irradiance, lanes: lanes & lanes_where(&is_any) }
@@ -147,8 +156,8 @@ fn reflected(
     points: &SurfaceBlock,
     looks: &Looks,
     arriving: &Arriving,
-) -> (RgbLanes, u16) {
-    let mut light = [[0.0; LANES]; 3];
+) -> (RgbLanes<LANES>, u16) {
+    let mut light = RgbLanes::BLACK;
     let mut is_reflected = [false; LANES];
     for i in 0..LANES {
         let l = arriving.direction.get(i);
@@ -158,9 +167,9 @@ fn reflected(
         let share = cos * std::f32::consts::FRAC_1_PI;
         let mut is_black = true;
         for c in 0..3 {
-            let response = looks.lambertian[c][i] * share;
+            let response = looks.lambertian.0[c][i] * share;
             is_black &= response == 0.0;
-            light[c][i] = response * arriving.irradiance[c][i];
+            light.0[c][i] = response * arriving.irradiance.0[c][i];
         }
         is_reflected[i] = is_before & !is_black;
     }
@@ -169,9 +178,7 @@ fn reflected(
         let (material, l) = (points.material(scene, lane), arriving.direction.get(lane));
         let response = material.response(points.normal.get(lane), -rays.get(lane).direction, l);
         if l.dot(points.geometric_normal.get(lane)) > 0.0 && !response.is_black() {
-            for (c, share) in response.to_array().into_iter().enumerate() {
-                light[c][lane] = share * arriving.irradiance[c][lane];
-            }
+            light.set(lane, response * arriving.irradiance.get(lane));
             lanes |= 1 << lane;
         }
     }

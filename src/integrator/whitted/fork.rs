@@ -103,7 +103,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             }
         }
         for lane in lanes_of(others) {
-            if let Some(hit) = hits.get(lane) {
+            if let Some(hit) = &hits.get(lane) {
                 let (point, material) =
                     (points.point(scene, hit, lane), points.material(scene, lane));
                 self.children(&nodes[lane], &point, material, weights[lane], Cone::default());

@@ -23,7 +23,7 @@ use std::marker::PhantomData;
 
 use super::{CameraBlock, Integrator, RayCounts};
 use crate::accel::{Hit, HitBlock, LANES, RayBlock, RayQuery};
-use crate::color::Rgb;
+use crate::color::{Rgb, RgbLanes};
 use crate::material::Material;
 use crate::math::Ray;
 use crate::medium::{Interior, beer_lambert};
@@ -169,7 +169,7 @@ impl<F: Features> Integrator for Whitted<F> {
         query: &Q,
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
-    ) -> [Rgb; LANES] {
+    ) -> RgbLanes<LANES> {
         self.trace(scene, query, camera, counts, None)
     }
 
@@ -179,8 +179,8 @@ impl<F: Features> Integrator for Whitted<F> {
         query: &Q,
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
-    ) -> ([Rgb; LANES], [Rgb; LANES]) {
-        let mut direct = [Rgb::BLACK; LANES];
+    ) -> (RgbLanes<LANES>, RgbLanes<LANES>) {
+        let mut direct = RgbLanes::BLACK;
         let radiance = self.trace(scene, query, camera, counts, Some(&mut direct));
         (radiance, direct)
     }
@@ -195,8 +195,8 @@ impl<F: Features> Whitted<F> {
         query: &Q,
         camera: &CameraBlock<'_>,
         counts: &mut RayCounts,
-        direct: Option<&mut [Rgb; LANES]>,
-    ) -> [Rgb; LANES] {
+        direct: Option<&mut RgbLanes<LANES>>,
+    ) -> RgbLanes<LANES> {
         if !F::TREE {
             let radiance = local(scene, query, camera, counts);
             if let Some(direct) = direct {
@@ -242,10 +242,10 @@ impl<F: Features> Whitted<F> {
         }
         // All that follows has bounced.
         if let Some(direct) = direct {
-            *direct = walk.radiance;
+            *direct = RgbLanes::from_fn(|lane| walk.radiance[lane]);
         }
         walk.run();
-        walk.radiance
+        RgbLanes::from_fn(|lane| walk.radiance[lane])
     }
 }
 
@@ -269,7 +269,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     #[inline]
     fn shade_one(&mut self, node: &Node, hit: Option<&Hit>) {
         if F::EVERYTHING {
-            self.shade(1, std::array::from_ref(node), |_| hit);
+            self.shade(1, std::array::from_ref(node), |_| hit.copied());
             return;
         }
         let scene = self.scene;
@@ -312,7 +312,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             let hit = hits.get(lane);
             weights[lane] = self.through_media(node, hit.map_or(f32::INFINITY, |hit| hit.t));
             let seen = match hit {
-                Some(_) => light.map(|c| c[lane]).into(),
+                Some(_) => light.get(lane),
                 None => scene.background,
             };
             self.counts.ends.miss += u64::from(hit.is_none());
@@ -331,11 +331,11 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
     /// Adds the light of the hits of up to `N` rays to their pixels, with all there is, and sends their children
     /// on.
     #[inline]
-    fn shade<'h, const N: usize>(
+    fn shade<const N: usize>(
         &mut self,
         active: u16,
         nodes: &[Node; N],
-        hit: impl Fn(usize) -> Option<&'h Hit>,
+        hit: impl Fn(usize) -> Option<Hit>,
     ) {
         let scene = self.scene;
         let mut hits = Hits::<N>::none();
@@ -343,7 +343,7 @@ impl<Q: RayQuery, F: Features> Walk<'_, Q, F> {
             let node = &nodes[lane];
             let hit = hit(lane);
             let weight = self.through_media(node, hit.map_or(f32::INFINITY, |hit| hit.t));
-            let Some(hit) = hit else {
+            let Some(hit) = &hit else {
                 self.counts.ends.miss += 1;
                 self.radiance[node.lane as usize] += weight * scene.background;
                 continue;
@@ -413,17 +413,18 @@ fn local<Q: RayQuery>(
     query: &Q,
     camera: &CameraBlock<'_>,
     counts: &mut RayCounts,
-) -> [Rgb; LANES] {
+) -> RgbLanes<LANES> {
     let points = scene.surfaces(camera.rays, camera.hits);
     counts.ends.miss += u64::from((camera.rays.active() & !points.hit()).count_ones());
     let blocked = |rays: &RayBlock| query.occluded_block(rays);
-    let radiance = direct_light(scene, camera.rays, &points, counts, blocked);
-    std::array::from_fn(|lane| {
-        if points.hit() >> lane & 1 == 0 {
-            return scene.background;
+    let mut radiance = direct_light(scene, camera.rays, &points, counts, blocked);
+    for (values, background) in radiance.0.iter_mut().zip(scene.background.to_array()) {
+        for (lane, value) in values.iter_mut().enumerate() {
+            let is_hit = points.hit() >> lane & 1 == 1;
+            *value = if is_hit { *value } else { background };
         }
-        radiance.map(|c| c[lane]).into()
-    })
+    }
+    radiance
 }
 
 /// How far a far camera's ray has come when it starts at the scene's box.

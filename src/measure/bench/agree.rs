@@ -61,7 +61,7 @@ pub(super) fn known(reference: &dyn Contestant, kind: RayKind, blocks: &[&RayBlo
             return Known { hits: [None; LANES], occluded: reference.occluded(block) };
         }
         let hits = reference.closest(block);
-        Known { hits: std::array::from_fn(|lane| hits.get(lane).copied()), occluded: 0 }
+        Known { hits: std::array::from_fn(|lane| hits.get(lane)), occluded: 0 }
     };
     blocks.par_iter().map(ask).collect()
 }
@@ -144,7 +144,7 @@ impl Judge<'_> {
                     _ => (Verdict::Same, None),
                 },
                 Some(hits) => {
-                    let got = hits.get(lane).copied();
+                    let got = hits.get(lane);
                     (self.verdict(&ray, expected, got.as_ref()), got)
                 }
             };
@@ -219,7 +219,7 @@ impl Judge<'_> {
         let hits = self.reference.closest(&block);
         block.lanes().any(|lane| match (hits.get(lane), got) {
             (None, None) => true,
-            (Some(a), Some(b)) => (a.t - b.t).abs() <= self.tolerance(ray, a, by),
+            (Some(a), Some(b)) => (a.t - b.t).abs() <= self.tolerance(ray, &a, by),
             _ => false,
         })
     }
@@ -269,7 +269,7 @@ impl Judge<'_> {
 fn closest(row: &dyn Contestant, ray: &Ray) -> Option<Hit> {
     let mut block = RayBlock::empty();
     block.set(0, ray);
-    row.closest(&block).get(0).copied()
+    row.closest(&block).get(0)
 }
 
 fn who(hit: &Hit) -> (Option<crate::accel::CopyRef>, u32, u32) {

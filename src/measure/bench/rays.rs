@@ -113,7 +113,7 @@ impl Rays {
         for lane in camera.lanes() {
             let Some(hit) = hits.get(lane) else { continue };
             let ray = camera.get(lane);
-            let point = scene.surface(&ray, hit);
+            let point = scene.surface(&ray, &hit);
             let leaves = |direction: glam::Vec3| direction.dot(point.geometric_normal) > 0.0;
             let further = |d| (leaves(d)).then(|| scene.spawn(&point, d, f32::INFINITY));
             let [u, v, ..] = samplers[lane].four(Dimensions::Light);
