@@ -379,6 +379,39 @@ fn spheres_stand_beside_triangles() {
     assert_eq!(ids(out), (1, 1));
 }
 
+/// Copies above a mesh, so many of both that several threads build the tree: none forgets that there are copies.
+#[test]
+fn copies_stand_beside_triangles_in_large_trees() {
+    let n = 100;
+    let places =
+        (0..n * n).map(|i| DVec3::new(f64::from(i % n), 2.0, f64::from(i / n)) * 0.02 - 1.0);
+    let rows = places.map(|at| {
+        rows_from_affine(&DAffine3::from_scale_rotation_translation(
+            DVec3::splat(0.005),
+            glam::DQuat::IDENTITY,
+            at,
+        ))
+    });
+    let transforms: Vec<_> = rows.collect();
+    let mesh = |n, offset| Geometry::Mesh(field(n, 1.0, offset));
+    let group = |geometry| Group { geometries: vec![geometry], ..Group::default() };
+    let world = World {
+        root: group(mesh(100, Vec3::NEG_Y * 3.0)),
+        prototypes: vec![group(mesh(1, Vec3::ZERO))],
+        sets: vec![InstanceSet { prototype: 0, transforms: Arc::new(transforms) }],
+    };
+    let accel = built(&world, None, Some(2));
+    for i in (0..n * n).step_by(37) {
+        // A little beside the middle, where two triangles meet.
+        let at = Vec3::new((i % n) as f32, 0.0, (i / n) as f32) * 0.02 - Vec3::new(0.999, 0.0, 1.0);
+        let down = Ray::new(at + Vec3::Y * 3.0, Vec3::NEG_Y);
+        let copy = accel.intersect(&down).and_then(|hit| hit.copy);
+        assert_eq!(copy.map(|copy| copy.index), Some(i as u32));
+        let up = Ray::new(at - Vec3::Y * 5.0, Vec3::Y);
+        assert!(accel.intersect(&up).is_some_and(|hit| hit.copy.is_none()));
+    }
+}
+
 /// Planes without end, in the root and in a copy, in front of and behind a mesh.
 #[test]
 fn planes_without_end_are_hit() {
