@@ -93,12 +93,6 @@ pub(crate) fn lanes_of(mut bits: u16) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The lanes whose flag is set, as bits.
-#[inline]
-pub(crate) fn lanes_where(flags: &[bool; LANES]) -> u16 {
-    (0..LANES).fold(0, |bits, lane| bits | u16::from(flags[lane]) << lane)
-}
-
 /// The hits of a block: the fields of [`Hit`], a lane each.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]

@@ -163,7 +163,7 @@ impl EmbreeAccel {
             let set = self.sets[(hit.instance - self.first_set) as usize];
             Some(CopyRef { set, index: hit.instance_primitive })
         };
-        let (u, v) = weights(hit.u, hit.v);
+        let (u, v) = Hit::weights(hit.u, hit.v);
         Some(Hit { t: hit.t, u, v, primitive: hit.primitive, geometry: hit.geometry, copy })
     }
 
@@ -183,7 +183,7 @@ impl EmbreeAccel {
             for i in 0..N {
                 is_hit[i] = (hit.geometry[i] != INVALID_ID) & ray.t_max[i].is_finite();
                 is_copy |= is_hit[i] & (hit.instance[i] != INVALID_ID);
-                (u[i], v[i]) = weights(hit.u[i], hit.v[i]);
+                (u[i], v[i]) = Hit::weights(hit.u[i], hit.v[i]);
             }
             let bits = (0..N).fold(0, |bits, i| bits | u16::from(is_hit[i]) << i) & bits as u16;
             if !is_copy {
@@ -277,13 +277,6 @@ impl RayQuery for EmbreeAccel {
     fn occluded_by_opaque_block(&self, rays: &RayBlock) -> u16 {
         self.occluded_in_packets(rays, OPAQUE)
     }
-}
-
-/// Barycentric weights: robust traversal leaves them a little outside where the origin is far.
-#[inline]
-fn weights(u: f32, v: f32) -> (f32, f32) {
-    let u = u.clamp(0.0, 1.0);
-    (u, v.clamp(0.0, 1.0 - u))
 }
 
 /// The active lanes among the `N` from `start` on.

@@ -23,8 +23,8 @@ mod world;
 
 use std::fmt;
 
+pub(crate) use block::lanes_of;
 pub use block::{HitBlock, LANES, RayBlock};
-pub(crate) use block::{lanes_of, lanes_where};
 pub use brute::BruteForce;
 pub use bvh::BvhAccel;
 #[cfg(feature = "crates")]
@@ -90,6 +90,14 @@ pub struct Hit {
 }
 
 impl Hit {
+    /// Barycentric weights of the second and the third corner within their bounds: they are rounded, and where the
+    /// origin is far Embree's robust traversal leaves them a little outside.
+    #[inline(always)]
+    const fn weights(u: f32, v: f32) -> (f32, f32) {
+        let u = u.clamp(0.0, 1.0);
+        (u, v.clamp(0.0, 1.0 - u))
+    }
+
     /// Which part of a shape was hit; not for triangles.
     #[inline]
     pub const fn part(&self) -> u8 {

@@ -12,6 +12,7 @@
 use std::ops::Range;
 
 use crate::color::RgbLanes;
+use crate::math::lanes_where;
 
 /// Pixels of a block: 4 × 4, in rows.
 pub const BLOCK_LANES: usize = 16;
@@ -331,12 +332,6 @@ fn counting(valid: u16, radiance: &RgbLanes<BLOCK_LANES>) -> [bool; BLOCK_LANES]
         let is_finite = r[lane].is_finite() & g[lane].is_finite() & b[lane].is_finite();
         (valid >> lane & 1 == 1) & is_finite
     })
-}
-
-/// The lanes whose flag is set, as bits.
-#[inline(always)]
-fn lanes_where(flags: &[bool; BLOCK_LANES]) -> u16 {
-    (0..BLOCK_LANES).fold(0, |bits, lane| bits | u16::from(flags[lane]) << lane)
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Ambient occlusion: how much of its surroundings a point sees. A cheap look at shapes, without lights.
 
 use super::{CameraBlock, Integrator, RayCounts};
-use crate::accel::{LANES, RayQuery, lanes_where};
+use crate::accel::{LANES, RayQuery};
 use crate::color::{Rgb, RgbLanes};
-use crate::math::{Vec3Lanes, cosine_hemisphere};
+use crate::math::{Vec3Lanes, cosine_hemisphere, lanes_where};
 use crate::sampler::{Dimensions, Sampler};
 use crate::scene::Scene;
 

@@ -34,6 +34,12 @@ impl<const N: usize> Vec3Lanes<N> {
     }
 }
 
+/// The lanes, up to sixteen, whose flag is set, as bits.
+#[inline(always)]
+pub(crate) fn lanes_where<const N: usize>(flags: &[bool; N]) -> u16 {
+    (0..N).fold(0, |bits, lane| bits | u16::from(flags[lane]) << lane)
+}
+
 /// The vector at unit length, or zero where it has no direction: [`DVec3::normalize_or_zero`] without a
 /// branch, which would keep a loop over lanes from becoming vector instructions.
 #[inline(always)]

@@ -13,6 +13,7 @@ mod rounding;
 mod warp;
 
 pub use bounds::Bounds;
+pub(crate) use lanes::lanes_where;
 pub use lanes::{Vec3Lanes, unit_or_zero};
 pub use quartic::Quartic;
 pub use ray::Ray;

@@ -12,10 +12,10 @@ use super::media::Crossing;
 use super::surface::{
     Local, SurfacePoint, as_far_as, facing, on_sphere, on_triangle, smooth_normal, spawn, to_world,
 };
-use crate::accel::{Geometry, Hit, HitBlock, LANES, RayBlock, lanes_of, lanes_where};
+use crate::accel::{Geometry, Hit, HitBlock, LANES, RayBlock, lanes_of};
 use crate::geometry::{Sphere, TriangleMesh};
 use crate::material::Material;
-use crate::math::Vec3Lanes;
+use crate::math::{Vec3Lanes, lanes_where};
 use crate::medium::Interior;
 
 /// Points on surfaces, by lane; see [`SurfacePoint`].

@@ -19,10 +19,10 @@ mod watch;
 
 use rayon::prelude::*;
 
-use super::block::{HitBlock, LANES, RayBlock, lanes_where};
+use super::block::{HitBlock, LANES, RayBlock};
 use super::world::{CopyRef, World};
 use super::{AccelError, AccelInfo, BuildOptions, BuildQuality, Hit, Precision, RayQuery};
-use crate::math::Ray;
+use crate::math::{Ray, lanes_where};
 use group::{Copy, GroupTree, RootItems};
 use packet::{FoundLanes, Packet};
 use simd::{Isa, Kernel, Simd};
@@ -124,7 +124,7 @@ impl BvhAccel {
             }
         };
         let (_, geometry, primitive) = group.primitive(found.id);
-        let (u, v) = weights(found.u, found.v);
+        let (u, v) = Hit::weights(found.u, found.v);
         Hit { t: found.t, u, v, primitive, geometry, copy }
     }
 
@@ -139,7 +139,7 @@ impl BvhAccel {
         // Its primitives are numbered as those of the tree.
         let (mut u, mut v, mut is_hit) = ([0.0; LANES], [0.0; LANES], [false; LANES]);
         for i in 0..LANES {
-            (u[i], v[i]) = weights(found.u[i], found.v[i]);
+            (u[i], v[i]) = Hit::weights(found.u[i], found.v[i]);
             is_hit[i] = found.id[i] != Found::NOTHING;
         }
         let mut hits = HitBlock::NONE;
@@ -217,13 +217,6 @@ impl RayQuery for BvhAccel {
     fn occluded_by_opaque_block(&self, rays: &RayBlock) -> u16 {
         self.any_of_block::<true>(rays)
     }
-}
-
-/// Barycentric weights: they are rounded, and their sum with them.
-#[inline(always)]
-const fn weights(u: f32, v: f32) -> (f32, f32) {
-    let u = u.clamp(0.0, 1.0);
-    (u, v.clamp(0.0, 1.0 - u))
 }
 
 struct Closest<'a, const ROBUST: bool> {

@@ -2,15 +2,15 @@
 //!
 //! A node's eight boxes are tested at once against all that the rays could be: intervals of origins and
 //! reciprocal directions. Source: Wald, Boulos, Shirley, *Ray tracing deformable scenes using dynamic
-//! bounding volume hierarchies*, TOG 26(1), 2007. The box of what is visited next is tested against the
-//! sixteen rays; at a leaf, each that meets it is tested as a single ray is: with the same results to the
-//! last bit.
+//! bounding volume hierarchies*, TOG 26(1), 2007. The box of a leaf is tested against the sixteen rays; those that
+//! meet it are tested as a single ray is, two at a time: with the same results to the last bit.
 
-use super::super::block::{LANES, RayBlock, lanes_of, lanes_where};
+use super::super::block::{LANES, RayBlock, lanes_of};
 use super::node::{Content, Node, Tree, WIDTH};
 use super::ray::{RaySetup, ShearRay, turned};
 use super::simd::{Floats, Simd, Sixteen, Stack};
 use super::traverse::{Found, Items, STACK, ask};
+use crate::math::lanes_where;
 
 /// The rays of a block whose directions have the same signs: the fields of [`RaySetup`], a lane each.
 pub(super) struct Packet {
@@ -321,15 +321,14 @@ fn closest_in<S: Simd, const ROBUST: bool, const TRIANGLES: bool>(
         id: [nothing.id; LANES],
         copy: [nothing.copy; LANES],
     };
-    if !tree.endless.is_empty() {
-        for lane in lanes_of(packet.active) {
-            let mut found = best.get(lane);
-            for &item in &tree.endless {
-                ask(simd, items, item, &block.get(lane), &mut found);
-            }
-            best.set(lane, found);
-            packet.t_max[lane] = found.t;
+    let asked = if tree.endless.is_empty() { 0 } else { packet.active };
+    for lane in lanes_of(asked) {
+        let mut found = best.get(lane);
+        for &item in &tree.endless {
+            ask(simd, items, item, &block.get(lane), &mut found);
         }
+        best.set(lane, found);
+        packet.t_max[lane] = found.t;
     }
     packet.traverse(simd, tree, |content, lanes, t_max| {
         let mut is_changed = false;
@@ -403,7 +402,8 @@ fn any_in<S: Simd, const ROBUST: bool, const OPAQUE: bool, const TRIANGLES: bool
     packet: &mut Packet,
 ) -> u16 {
     let mut occluded = 0;
-    for lane in lanes_of(packet.active).filter(|_| !tree.endless.is_empty()) {
+    let asked = if tree.endless.is_empty() { 0 } else { packet.active };
+    for lane in lanes_of(asked) {
         let ray = block.get(lane);
         if tree.endless.iter().any(|&item| items.occluded::<S, OPAQUE>(simd, item, &ray)) {
             occluded |= 1 << lane;

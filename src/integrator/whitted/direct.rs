@@ -5,10 +5,10 @@
 #![expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 
 use super::super::RayCounts;
-use crate::accel::{LANES, RayBlock, lanes_of, lanes_where};
+use crate::accel::{LANES, RayBlock, lanes_of};
 use crate::color::{Rgb, RgbLanes};
 use crate::light::{Light, PointLight};
-use crate::math::Vec3Lanes;
+use crate::math::{Vec3Lanes, lanes_where};
 use crate::scene::{Scene, SurfaceBlock};
 
 /// The light that arrives from one lamp, by lane.

@@ -4,10 +4,10 @@
 
 use super::scatter::{Branch, Way, mirror_normal, mirrored_direction};
 use super::{Features, Node, Walk};
-use crate::accel::{HitBlock, LANES, RayBlock, RayQuery, lanes_of, lanes_where};
+use crate::accel::{HitBlock, LANES, RayBlock, RayQuery, lanes_of};
 use crate::color::Rgb;
 use crate::material::{FresnelModel, Material, fresnel};
-use crate::math::Vec3Lanes;
+use crate::math::{Vec3Lanes, lanes_where};
 use crate::medium::Interior;
 use crate::scene::{Cone, SurfaceBlock};
 
