@@ -4,6 +4,7 @@ use super::Rgb;
 
 /// `N` colours by component, red first. Loops over its lanes without branches become vector instructions.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
 pub struct RgbLanes<const N: usize>(pub [[f32; N]; 3]);
 
 impl<const N: usize> RgbLanes<N> {

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 /// `N` vectors by axis. Loops over its lanes without branches become vector instructions.
 #[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
 #[expect(missing_docs, reason = "said above")]
 pub struct Vec3Lanes<const N: usize> {
     pub x: [f32; N],

@@ -260,12 +260,13 @@ impl<const ROBUST: bool> Kernel for ClosestOfBlock<'_, ROBUST> {
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> HitBlock {
         let Self { accel, rays } = self;
-        let Some(mut packet) = Packet::new::<S, ROBUST>(simd, rays) else {
+        let mut packet = Packet::new::<S, ROBUST>(simd, rays);
+        if !packet.has_one_sign {
             return HitBlock::from_fn(rays.active(), |lane| {
                 let ray = &rays.get(lane);
                 simd.run(Closest::<ROBUST> { accel, ray }).map(|found| accel.hit(&found))
             });
-        };
+        }
         let tree = &accel.root.tree;
         let best =
             packet::closest::<S, ROBUST>(simd, tree, accel.items::<ROBUST>(), rays, &mut packet);
@@ -284,7 +285,8 @@ impl<const ROBUST: bool, const OPAQUE: bool> Kernel for AnyOfBlock<'_, ROBUST, O
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> u16 {
         let Self { accel, rays } = self;
-        let Some(mut packet) = Packet::new::<S, ROBUST>(simd, rays) else {
+        let mut packet = Packet::new::<S, ROBUST>(simd, rays);
+        if !packet.has_one_sign {
             return rays
                 .lanes()
                 .filter(|lane| {
@@ -292,7 +294,7 @@ impl<const ROBUST: bool, const OPAQUE: bool> Kernel for AnyOfBlock<'_, ROBUST, O
                     simd.run(Any::<ROBUST, OPAQUE> { accel, ray })
                 })
                 .fold(0, |bits, lane| bits | 1 << lane);
-        };
+        }
         let (tree, items) = (&accel.root.tree, accel.items::<ROBUST>());
         packet::any::<S, ROBUST, OPAQUE>(simd, tree, items, rays, &mut packet)
     }

@@ -12,9 +12,10 @@ use super::simd::{Floats, Simd, Sixteen, Stack};
 use super::traverse::{Found, Items, STACK, ask};
 use crate::math::lanes_where;
 
-/// The rays of a block whose directions have the same signs: the fields of [`RaySetup`], a lane each.
+/// The rays of a block, the fields of [`RaySetup`], a lane each. They are traversed together where their directions
+/// have the same signs. Aligned, so that what is loaded side by side lies in one line of the cache.
+#[repr(C, align(64))]
 pub(super) struct Packet {
-    active: u16,
     origin: [[f32; LANES]; 3],
     far_origin: [[f32; LANES]; 3],
     near: [[f32; LANES]; 3],
@@ -24,82 +25,84 @@ pub(super) struct Packet {
     t_max: [f32; LANES],
     last: [u32; LANES],
     shear: [[f32; LANES]; 3],
+    active: u16,
     /// By axis, for the plane that is entered first and then for the other: the end of the interval of
     /// origins that counts, and both ends of that of reciprocals.
     intervals: [[[f32; 3]; 2]; 3],
     sign: [usize; 3],
     least_t: f32,
+    /// Whether directions have the same signs.
+    pub(super) has_one_sign: bool,
 }
 
 impl Packet {
-    /// None where signs differ.
+    /// See [`Self::has_one_sign`] before anything is asked of it.
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "several arrays run along together")]
-    pub(super) fn new<S: Simd, const ROBUST: bool>(simd: S, block: &RayBlock) -> Option<Self> {
+    pub(super) fn new<S: Simd, const ROBUST: bool>(simd: S, block: &RayBlock) -> Self {
+        // By themselves, not in the packet: then nothing is zeroed first.
         const NOTHING: [f32; LANES] = [0.0; LANES];
-        let mut packet = Self {
-            active: 0,
-            origin: [NOTHING; 3],
-            far_origin: [NOTHING; 3],
-            near: [NOTHING; 3],
-            far: [NOTHING; 3],
-            t_min: NOTHING,
-            t_max: NOTHING,
-            last: [0; LANES],
-            shear: [NOTHING; 3],
-            intervals: [[[0.0; 3]; 2]; 3],
-            sign: [0; 3],
-            least_t: 0.0,
-        };
-        let mut is_ray = [false; LANES];
+        let (mut origin, mut far_origin) = ([NOTHING; 3], [NOTHING; 3]);
+        let (mut near, mut far, mut shear) = ([NOTHING; 3], [NOTHING; 3], [NOTHING; 3]);
+        let (mut t_min, mut t_max) = (NOTHING, NOTHING);
+        let (mut last, mut is_ray) = ([0; LANES], [false; LANES]);
         for i in 0..LANES {
             let o = [block.org_x[i], block.org_y[i], block.org_z[i]];
             let d = [block.dir_x[i], block.dir_y[i], block.dir_z[i]];
             let (ray, is) = RaySetup::of::<ROBUST>(o, d, [block.t_min[i], block.t_max[i]]);
             is_ray[i] = is;
             for axis in 0..3 {
-                packet.origin[axis][i] = ray.origin[axis];
-                packet.far_origin[axis][i] = ray.far_origin[axis];
-                packet.near[axis][i] = ray.near[axis];
-                packet.far[axis][i] = ray.far[axis];
-                packet.shear[axis][i] = ray.shear[axis];
+                origin[axis][i] = ray.origin[axis];
+                far_origin[axis][i] = ray.far_origin[axis];
+                near[axis][i] = ray.near[axis];
+                far[axis][i] = ray.far[axis];
+                shear[axis][i] = ray.shear[axis];
             }
-            packet.t_min[i] = ray.t_min;
-            packet.t_max[i] = ray.t_max;
-            packet.last[i] = ray.last;
+            (t_min[i], t_max[i], last[i]) = (ray.t_min, ray.t_max, ray.last);
         }
-        packet.active = block.active() & lanes_where(&is_ray);
+        let active = block.active() & lanes_where(&is_ray);
         // Lanes without a ray repeat one that is there, and look for nothing.
-        let first = packet.active.trailing_zeros() as usize % LANES;
-        for lane in lanes_of(!packet.active) {
+        let first = active.trailing_zeros() as usize % LANES;
+        for lane in lanes_of(!active) {
             for axis in 0..3 {
-                packet.origin[axis][lane] = packet.origin[axis][first];
-                packet.far_origin[axis][lane] = packet.far_origin[axis][first];
-                packet.near[axis][lane] = packet.near[axis][first];
-                packet.far[axis][lane] = packet.far[axis][first];
+                origin[axis][lane] = origin[axis][first];
+                far_origin[axis][lane] = far_origin[axis][first];
+                near[axis][lane] = near[axis][first];
+                far[axis][lane] = far[axis][first];
             }
-            packet.t_min[lane] = packet.t_min[first];
-            packet.t_max[lane] = f32::NEG_INFINITY;
+            t_min[lane] = t_min[first];
+            t_max[lane] = f32::NEG_INFINITY;
         }
-        packet.least_t = simd.load16(&packet.t_min).least();
+        let (mut intervals, mut sign) = ([[[0.0; 3]; 2]; 3], [0; 3]);
+        let mut has_one_sign = true;
         for axis in 0..3 {
-            let near = simd.load16(&packet.near[axis]);
+            let [origin, far_origin, near, far] =
+                [&origin, &far_origin, &near, &far].map(|of| simd.load16(&of[axis]));
             let (low, high) = (near.least(), near.greatest());
-            if low < 0.0 && high >= 0.0 {
-                return None;
-            }
-            packet.sign[axis] = usize::from(low < 0.0);
-            let (origin, far_origin) =
-                (simd.load16(&packet.origin[axis]), simd.load16(&packet.far_origin[axis]));
-            let ends = if packet.sign[axis] == 0 {
+            has_one_sign &= low >= 0.0 || high < 0.0;
+            sign[axis] = usize::from(low < 0.0);
+            let ends = if sign[axis] == 0 {
                 [origin.greatest(), far_origin.least()]
             } else {
                 [origin.least(), far_origin.greatest()]
             };
-            let far = simd.load16(&packet.far[axis]);
-            packet.intervals[axis] = [[ends[0], low, high], [ends[1], far.least(), far.greatest()]];
+            intervals[axis] = [[ends[0], low, high], [ends[1], far.least(), far.greatest()]];
         }
-        Some(packet)
+        let least_t = simd.load16(&t_min).least();
+        Self {
+            origin,
+            far_origin,
+            near,
+            far,
+            t_min,
+            t_max,
+            last,
+            shear,
+            active,
+            intervals,
+            sign,
+            least_t,
+            has_one_sign,
+        }
     }
 
     /// Calls `visit` with the rays of `lanes` for triangles, two at a time: of which lanes they are. One that is left
@@ -266,6 +269,7 @@ impl Packet {
 }
 
 /// What the rays of a packet hit, as [`Found`] has it, a lane each.
+#[repr(C, align(64))]
 pub(super) struct FoundLanes {
     pub(super) t: [f32; LANES],
     pub(super) u: [f32; LANES],
