@@ -3,6 +3,7 @@
 use super::Rgb;
 
 /// `N` colours by component, red first. Loops over its lanes without branches become vector instructions.
+// Aligned, so that what they load lies in one line of the cache.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
 pub struct RgbLanes<const N: usize>(pub [[f32; N]; 3]);

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 /// `N` vectors by axis. Loops over its lanes without branches become vector instructions.
+// Aligned, so that what they load lies in one line of the cache.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 #[expect(missing_docs, reason = "said above")]
