@@ -42,6 +42,22 @@ impl RayBlock {
         }
     }
 
+    /// The rays of all lanes, of which `lanes` are active.
+    #[inline(always)]
+    pub fn from_fn(lanes: u16, ray: impl Fn(usize) -> Ray) -> Self {
+        // By themselves, not in the block: then nothing is zeroed first.
+        const NOTHING: [f32; LANES] = [0.0; LANES];
+        let (mut org_x, mut org_y, mut org_z, mut t_min) = (NOTHING, NOTHING, NOTHING, NOTHING);
+        let (mut dir_x, mut dir_y, mut dir_z, mut t_max) = (NOTHING, NOTHING, NOTHING, NOTHING);
+        for i in 0..LANES {
+            let ray = ray(i);
+            [org_x[i], org_y[i], org_z[i]] = ray.origin.to_array();
+            [dir_x[i], dir_y[i], dir_z[i]] = ray.direction.to_array();
+            (t_min[i], t_max[i]) = (ray.t_min, ray.t_max);
+        }
+        Self { org_x, org_y, org_z, t_min, dir_x, dir_y, dir_z, t_max, active: lanes }
+    }
+
     /// Makes lanes active whose rays were written side by side, and others not.
     #[inline]
     pub const fn activate(&mut self, lanes: u16) {

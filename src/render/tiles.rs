@@ -267,6 +267,7 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             (output.rays, [output.non_finite.count, output.non_finite.first.len() as u64]);
         let pixels: [PixelSampler; LANES] =
             std::array::from_fn(|lane| PixelSampler::new(self.seed, pixel(lane)));
+        let mut rays = RayBlock::empty();
         for sample in samples {
             if sample % STOP_EVERY == 0 && observer.stop() {
                 output.rays = counted;
@@ -275,7 +276,7 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
                 return false;
             }
             let samplers = pixels.map(|pixel| pixel.sample(sample));
-            let (rays, weights) = self.camera_rays(origin, inside, &samplers);
+            let weights = self.camera_rays(origin, inside, &samplers, &mut rays);
             output.rays.camera += u64::from(rays.active().count_ones());
             let hits = self.query.intersect_block(&rays);
             let camera = CameraBlock { rays: &rays, hits: &hits, samplers: &samplers };
@@ -317,7 +318,7 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
         true
     }
 
-    /// The camera rays of one sample of the pixels of a block that are `inside` the picture, and what the
+    /// Writes the camera rays of one sample of the pixels of a block that are `inside` the picture; what the
     /// filter makes of what they see.
     #[inline]
     fn camera_rays(
@@ -325,7 +326,8 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
         [x0, y0]: [u32; 2],
         inside: u16,
         samplers: &[Sampler; LANES],
-    ) -> (RayBlock, [f32; LANES]) {
+        rays: &mut RayBlock,
+    ) -> [f32; LANES] {
         let camera = &self.scene.camera;
         let (u, v, lens) = if camera.has_lens() {
             let [u, v, lens_u, lens_v] = Sampler::numbers(samplers, Dimensions::Camera);
@@ -340,22 +342,22 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             x[lane] = f64::from(x0 + lane as u32 % 4) + 0.5 + f64::from(dx[lane]);
             y[lane] = f64::from(y0 + lane as u32 / 4) + 0.5 + f64::from(dy[lane]);
         }
-        let mut rays = RayBlock::empty();
         if let Some((eye, directions)) = camera.pinhole_rays(&x, &y) {
             rays.org_x = [eye.x; LANES];
             rays.org_y = [eye.y; LANES];
             rays.org_z = [eye.z; LANES];
             (rays.dir_x, rays.dir_y, rays.dir_z) = (directions.x, directions.y, directions.z);
-            rays.t_max = [f32::INFINITY; LANES];
+            (rays.t_min, rays.t_max) = ([0.0; LANES], [f32::INFINITY; LANES]);
             rays.activate(inside);
-            return (rays, weights);
+            return weights;
         }
+        rays.activate(0);
         for lane in (0..LANES).filter(|lane| inside >> lane & 1 == 1) {
             let film = DVec2::new(x[lane], y[lane]);
             if let Some(ray) = camera.ray(film, lens.map(|numbers| numbers[lane])) {
                 rays.set(lane, &ray);
             }
         }
-        (rays, weights)
+        weights
     }
 }

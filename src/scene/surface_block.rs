@@ -32,7 +32,8 @@ pub struct SurfaceBlock {
     is_front: [bool; LANES],
     material: [u32; LANES],
     hit: u16,
-    spheres: Spheres,
+    /// Where any is hit.
+    spheres: Option<Spheres>,
 }
 
 impl SurfaceBlock {
@@ -95,15 +96,15 @@ impl Scene {
             normal: Vec3Lanes::ZERO,
             is_front: [false; LANES],
             material: [0; LANES],
-            hit: 0,
-            spheres: Spheres::NONE,
+            hit: hits.lanes(),
+            spheres: None,
         };
-        block.hit = hits.lanes();
         if let Some((mesh, looks)) = self.only_flat_mesh(hits) {
             for lane in lanes_of(block.hit) {
                 block.material[lane] = looks.of(hits.primitives()[lane]).material;
             }
-            let corners = corners_of(mesh, hits);
+            let mut corners = [Vec3Lanes::ZERO; 3];
+            corners_of(mesh, hits, &mut corners);
             let SurfaceBlock { position, error, geometric_normal, is_front, normal, .. } =
                 &mut block;
             let [u, v] = hits.weights();
@@ -126,7 +127,8 @@ impl Scene {
                 match self.sphere(hit) {
                     Some((sphere, _)) => {
                         block.material[lane] = self.look(hit).material;
-                        block.spheres.set(lane, sphere, hit.t);
+                        let spheres = block.spheres.get_or_insert(Spheres::NONE);
+                        spheres.set(lane, sphere, hit.t);
                     }
                     None => others |= 1 << lane,
                 }
@@ -171,11 +173,8 @@ impl Scene {
                 }
             }
         }
-        let spheres = block.spheres.lanes;
-        if spheres != 0 {
-            others |= spheres & !on_spheres(rays, &mut block);
-        }
-        if triangles | spheres != 0 {
+        others |= on_spheres(rays, &mut block);
+        if triangles != 0 || block.spheres.is_some() {
             let SurfaceBlock { geometric_normal, normal, is_front, .. } = &mut block;
             face(rays, geometric_normal, normal, is_front);
         }
@@ -210,17 +209,11 @@ impl Scene {
         distances: &[f32; LANES],
         lanes: u16,
     ) -> RayBlock {
-        let mut rays = RayBlock::empty();
         let epsilon = self.settings.epsilon;
-        for i in 0..LANES {
+        RayBlock::from_fn(lanes, |i| {
             let (p, n) = (points.position.get(i), points.geometric_normal.get(i));
-            let ray = spawn(epsilon, p, points.error[i], n, directions.get(i), distances[i]);
-            [rays.org_x[i], rays.org_y[i], rays.org_z[i]] = ray.origin.to_array();
-            [rays.dir_x[i], rays.dir_y[i], rays.dir_z[i]] = ray.direction.to_array();
-            (rays.t_min[i], rays.t_max[i]) = (ray.t_min, ray.t_max);
-        }
-        rays.activate(lanes);
-        rays
+            spawn(epsilon, p, points.error[i], n, directions.get(i), distances[i])
+        })
     }
 
     /// The rays that leave the `hits` of `lanes` into `directions` (unit length) for whatever comes, and what they
@@ -234,11 +227,12 @@ impl Scene {
     ) -> (RayBlock, [Option<FarSide>; LANES]) {
         let mut rays = self.spawn_block(points, directions, &[f32::INFINITY; LANES], lanes);
         let mut known = [None; LANES];
-        let within = points.spheres.lanes & lanes & inward(points, directions);
+        let Some(spheres) = &points.spheres else { return (rays, known) };
+        let within = spheres.lanes & lanes & inward(points, directions);
         if within == 0 {
             return (rays, known);
         }
-        let (far, is_right) = far_sides(&points.spheres, &rays);
+        let (far, is_right) = far_sides(spheres, &rays);
         for lane in lanes_of(within) {
             let Some(hit) = &hits.get(lane) else { continue };
             if is_right[lane] {
@@ -285,18 +279,16 @@ fn far_sides(spheres: &Spheres, rays: &RayBlock) -> ([f64; LANES], [bool; LANES]
 /// The corners of the triangles that were hit, all of one mesh: first all indices, then all positions, so that
 /// memory is asked at once for all that it takes a while to bring.
 #[inline(never)]
-fn corners_of(mesh: &TriangleMesh, hits: &HitBlock) -> [Vec3Lanes<LANES>; 3] {
+fn corners_of(mesh: &TriangleMesh, hits: &HitBlock, corners: &mut [Vec3Lanes<LANES>; 3]) {
     let mut faces = [[0; 3]; LANES];
     for lane in lanes_of(hits.lanes()) {
         faces[lane] = mesh.triangles[hits.primitives()[lane] as usize];
     }
-    let mut corners = [Vec3Lanes::ZERO; 3];
     for lane in lanes_of(hits.lanes()) {
         for (corners, vertex) in corners.iter_mut().zip(faces[lane]) {
             corners.set(lane, mesh.positions.get(vertex as usize));
         }
     }
-    corners
 }
 
 /// Position, error and normal of points on triangles.
@@ -355,11 +347,12 @@ impl Spheres {
 }
 
 /// Position, error and normal of points on spheres; of the other lanes nothing is changed. Returns the lanes
-/// that came close enough to theirs for it to be right.
+/// that did not come close enough to theirs for it to be right.
 #[inline(never)]
 fn on_spheres(rays: &RayBlock, block: &mut SurfaceBlock) -> u16 {
-    let mut is_right = [false; LANES];
     let SurfaceBlock { position, error, geometric_normal, normal, spheres, .. } = block;
+    let Some(spheres) = spheres else { return 0 };
+    let mut is_right = [false; LANES];
     for i in 0..LANES {
         let (local, is_close) = on_sphere(&spheres.get(i), &rays.get(i), spheres.t[i]);
         let is_sphere = spheres.is_sphere[i];
@@ -370,7 +363,7 @@ fn on_spheres(rays: &RayBlock, block: &mut SurfaceBlock) -> u16 {
         normal.set(i, chosen(local.normal, normal.get(i)));
         is_right[i] = is_close;
     }
-    lanes_where(&is_right)
+    spheres.lanes & !lanes_where(&is_right)
 }
 
 /// Turns the normals to the side that the rays come from.
