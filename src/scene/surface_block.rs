@@ -32,7 +32,7 @@ pub struct SurfaceBlock {
     is_front: [bool; LANES],
     material: [u32; LANES],
     hit: u16,
-    /// Where any is hit.
+    /// None where no sphere is hit: most blocks need not carry that much.
     spheres: Option<Spheres>,
 }
 
@@ -276,8 +276,8 @@ fn far_sides(spheres: &Spheres, rays: &RayBlock) -> ([f64; LANES], [bool; LANES]
     (far, is_right)
 }
 
-/// The corners of the triangles that were hit, all of one mesh: first all indices, then all positions, so that
-/// memory is asked at once for all that it takes a while to bring.
+/// Writes the corners of the triangles that were hit, all of one mesh: first all indices are read, then all
+/// positions, so that memory is asked at once for all that it takes a while to bring.
 #[inline(never)]
 fn corners_of(mesh: &TriangleMesh, hits: &HitBlock, corners: &mut [Vec3Lanes<LANES>; 3]) {
     let mut faces = [[0; 3]; LANES];
