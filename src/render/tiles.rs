@@ -298,7 +298,7 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             } else {
                 sums.radiance.add(sample, inside, &radiance)
             };
-            for lane in (0..LANES).filter(|lane| dropped >> lane & 1 == 1) {
+            for lane in lanes_of(dropped) {
                 let [x, y] = pixel(lane);
                 if !wanted.contains(x, y) {
                     continue;
@@ -352,7 +352,7 @@ impl<Q: RayQuery, I: Integrator> TileRenderer<'_, Q, I> {
             return weights;
         }
         rays.activate(0);
-        for lane in (0..LANES).filter(|lane| inside >> lane & 1 == 1) {
+        for lane in lanes_of(inside) {
             let film = DVec2::new(x[lane], y[lane]);
             if let Some(ray) = camera.ray(film, lens.map(|numbers| numbers[lane])) {
                 rays.set(lane, &ray);

@@ -34,11 +34,13 @@ impl Sampler {
     ) -> [[f32; N]; D] {
         // The algorithm of `sobol_burley::sample`, whose scrambles these are.
         const SCRAMBLES: [u32; 4] = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
-        let seeds: [u32; N] = std::array::from_fn(|i| samplers[i].stream_of(dimensions));
-        let mut index = [0u32; N];
+        // Apart from the scrambles: loops that pick fields out of structures are not made ones over lanes whole.
+        let (mut seeds, mut index) = ([0; N], [0; N]);
+        for (i, sampler) in samplers.iter().enumerate() {
+            (seeds[i], index[i]) = (sampler.stream_of(dimensions), sampler.index);
+        }
         for i in 0..N {
-            let reversed = samplers[i].index.reverse_bits();
-            index[i] = owen_scramble_rev(reversed, hash(seeds[i] ^ 0x79c6_8e4a));
+            index[i] = owen_scramble_rev(index[i].reverse_bits(), hash(seeds[i] ^ 0x79c6_8e4a));
         }
         let mut sobol = [[0u32; N]; D];
         // The first two without a table: their matrices are those of a reversal and of Pascal's triangle.
