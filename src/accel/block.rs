@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::Hit;
 use super::world::CopyRef;
-use crate::math::Ray;
+use crate::math::{Ray, lanes_where};
 
 /// Rays of a block.
 pub const LANES: usize = 16;
@@ -88,6 +88,19 @@ impl RayBlock {
     #[inline]
     pub const fn active(&self) -> u16 {
         self.active
+    }
+
+    /// Where all active rays have the same direction, to the last bit: one that has it.
+    #[inline(always)]
+    pub(crate) fn common_direction(&self) -> Option<usize> {
+        let first = self.active.trailing_zeros() as usize % LANES;
+        let differ = |d: &[f32; LANES], i: usize| d[i].to_bits() ^ d[first].to_bits();
+        let mut is_other = [false; LANES];
+        for (i, is_other) in is_other.iter_mut().enumerate() {
+            let [x, y, z] = [&self.dir_x, &self.dir_y, &self.dir_z].map(|d| differ(d, i));
+            *is_other = x | y | z != 0;
+        }
+        (lanes_where(&is_other) & self.active == 0).then_some(first)
     }
 
     /// The active lanes, in order.

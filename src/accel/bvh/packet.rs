@@ -7,7 +7,7 @@
 
 use super::super::block::{LANES, RayBlock, lanes_of};
 use super::node::{Content, Node, Tree, WIDTH};
-use super::ray::{RaySetup, ShearRay, turned};
+use super::ray::{RaySetup, ShearRay, Slopes, turned};
 use super::simd::{Floats, Simd, Sixteen, Stack};
 use super::traverse::{Found, Items, STACK, ask};
 use crate::math::lanes_where;
@@ -45,10 +45,17 @@ impl Packet {
         let (mut near, mut far, mut shear) = ([NOTHING; 3], [NOTHING; 3], [NOTHING; 3]);
         let (mut t_min, mut t_max) = (NOTHING, NOTHING);
         let (mut last, mut is_ray) = ([0; LANES], [false; LANES]);
+        let slopes =
+            |i: usize| Slopes::of::<ROBUST>([block.dir_x[i], block.dir_y[i], block.dir_z[i]]);
+        // As those that go to one light far away.
+        let shared = block.common_direction().map(slopes);
         for i in 0..LANES {
             let o = [block.org_x[i], block.org_y[i], block.org_z[i]];
-            let d = [block.dir_x[i], block.dir_y[i], block.dir_z[i]];
-            let (ray, is) = RaySetup::of::<ROBUST>(o, d, [block.t_min[i], block.t_max[i]]);
+            let slopes = match shared {
+                Some(slopes) => slopes,
+                None => slopes(i),
+            };
+            let (ray, is) = RaySetup::new(o, &slopes, [block.t_min[i], block.t_max[i]]);
             is_ray[i] = is;
             for axis in 0..3 {
                 origin[axis][i] = ray.origin[axis];
@@ -75,17 +82,13 @@ impl Packet {
         let (mut intervals, mut sign) = ([[[0.0; 3]; 2]; 3], [0; 3]);
         let mut has_one_sign = true;
         for axis in 0..3 {
-            let [origin, far_origin, near, far] =
-                [&origin, &far_origin, &near, &far].map(|of| simd.load16(&of[axis]));
-            let (low, high) = (near.least(), near.greatest());
+            let (origin, far_origin) = (ends(simd, &origin[axis]), ends(simd, &far_origin[axis]));
+            let ([low, high], far) = (ends(simd, &near[axis]), ends(simd, &far[axis]));
             has_one_sign &= low >= 0.0 || high < 0.0;
             sign[axis] = usize::from(low < 0.0);
-            let ends = if sign[axis] == 0 {
-                [origin.greatest(), far_origin.least()]
-            } else {
-                [origin.least(), far_origin.greatest()]
-            };
-            intervals[axis] = [[ends[0], low, high], [ends[1], far.least(), far.greatest()]];
+            // The last origin at planes that are entered, the first at those that are left.
+            let (enter, leave) = (origin[1 - sign[axis]], far_origin[sign[axis]]);
+            intervals[axis] = [[enter, low, high], [leave, far[0], far[1]]];
         }
         let least_t = simd.load16(&t_min).least();
         Self {
@@ -266,6 +269,17 @@ impl Packet {
         let exit = far[0].min(far[1]).min(far[2].min(t_max));
         enter.le(exit) as u16
     }
+}
+
+/// The least and the greatest of numbers none of which is NaN.
+#[inline(always)]
+fn ends<S: Simd>(simd: S, numbers: &[f32; LANES]) -> [f32; 2] {
+    let (lanes, first) = (simd.load16(numbers), simd.splat16(numbers[0]));
+    // Of rays from one point, or in one direction, it is one number, which is sooner told.
+    if lanes.le(first) & first.le(lanes) == 0xffff {
+        return [numbers[0]; 2];
+    }
+    [lanes.least(), lanes.greatest()]
 }
 
 /// What the rays of a packet hit, as [`Found`] has it, a lane each.

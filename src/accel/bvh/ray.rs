@@ -36,59 +36,75 @@ const HUGE: f32 = f32::MAX / 4.0;
 /// The largest where slabs are not exact.
 const MOST: f32 = 1e24;
 
-impl RaySetup {
-    /// No ray.
-    pub(super) const NOTHING: Self = Self {
-        origin: [0.0; 3],
-        far_origin: [0.0; 3],
-        near: [0.0; 3],
-        far: [0.0; 3],
-        t_min: 0.0,
-        t_max: 0.0,
-        last: 2,
-        shear: [0.0; 3],
-    };
+/// What boxes and triangles want of a ray's direction: the same for all rays that run along it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slopes {
+    direction: [f32; 3],
+    near: [f32; 3],
+    far: [f32; 3],
+    last: u32,
+    shear: [f32; 3],
+    /// Along the slabs of which axes it runs.
+    is_along: [bool; 3],
+    /// How far short of the origin such a slab is left, at least.
+    least: f32,
+    /// Whether it is one: neither zero nor NaN.
+    is_direction: bool,
+}
 
-    /// Whether anything can be hit, and if so, with what. Without branches, so that the compiler makes a
-    /// loop over several rays one over lanes.
+impl Slopes {
+    /// Without branches, so that the compiler makes a loop over several rays one over lanes.
     #[inline(always)]
-    pub(super) fn of<const ROBUST: bool>(
-        o: [f32; 3],
-        d: [f32; 3],
-        [t_min, t_max]: [f32; 2],
-    ) -> (Self, bool) {
+    pub(super) fn of<const ROBUST: bool>(d: [f32; 3]) -> Self {
         // Zero times a finite number is zero; any other is NaN.
-        let sum = [0, 1, 2].map(|axis| o[axis] * 0.0 + d[axis] * 0.0);
-        let t_max = if t_max < f32::MAX { t_max } else { f32::MAX };
+        let [x, y, z] = d.map(|d| d * 0.0 == 0.0);
         let size = d.map(f32::abs);
         let longest = if size[0] > size[1] { size[0] } else { size[1] };
         let longest = if longest > size[2] { longest } else { size[2] };
-        let is_finite = (sum[0] == 0.0) & (sum[1] == 0.0) & (sum[2] == 0.0);
-        let is_ray = is_finite & (longest > 0.0) & (t_min < t_max);
-
         let last = if size[0] == longest { 0 } else { 1 + u32::from(size[1] != longest) };
         let along = 1.0 / turned(d, last)[2];
-        let [x, y, _] = turned(d, last);
-        // Along a slab the reciprocal is huge, but finite, so that nothing is NaN; and the slab is left a
-        // little behind the origin, so that a ray in the very plane of a face is inside for as long as any
-        // ray goes (10¹³ units).
-        let least = 1e-24 / if longest < 1.0 { longest } else { 1.0 };
+        let [first, second, _] = turned(d, last);
         let margin = if ROBUST { MARGIN } else { 0.0 };
-        let mut setup = Self { t_min: t_min + 0.0, t_max, last, ..Self::NOTHING };
+        let (mut near, mut far, mut is_along) = ([0.0; 3], [0.0; 3], [false; 3]);
         for axis in 0..3 {
-            let (o, d) = (o[axis], d[axis]);
-            let is_along = d.abs() < longest * 1e-18;
-            let r = 1.0 / d;
-            let r = if is_along | (r.abs() > HUGE) { HUGE.copysign(d) } else { r };
-            let shift = o.abs() * f32::EPSILON;
-            let shift = if shift > least { shift } else { least }.copysign(d);
-            setup.origin[axis] = o;
-            setup.far_origin[axis] = if is_along { o - shift } else { o };
-            setup.near[axis] = r * (1.0 - margin);
-            setup.far[axis] = r * (1.0 + margin);
+            // Along a slab the reciprocal is huge, but finite, so that nothing is NaN.
+            is_along[axis] = size[axis] < longest * 1e-18;
+            let r = 1.0 / d[axis];
+            let r = if is_along[axis] | (r.abs() > HUGE) { HUGE.copysign(d[axis]) } else { r };
+            near[axis] = r * (1.0 - margin);
+            far[axis] = r * (1.0 + margin);
         }
-        setup.shear = [x * along, y * along, along];
-        (setup, is_ray)
+        Self {
+            direction: d,
+            near,
+            far,
+            last,
+            shear: [first * along, second * along, along],
+            is_along,
+            least: 1e-24 / if longest < 1.0 { longest } else { 1.0 },
+            is_direction: x & y & z & (longest > 0.0),
+        }
+    }
+}
+
+impl RaySetup {
+    /// Whether anything can be hit, and if so, with what. Without branches, likewise.
+    #[inline(always)]
+    pub(super) fn new(o: [f32; 3], slopes: &Slopes, [t_min, t_max]: [f32; 2]) -> (Self, bool) {
+        let Slopes { direction, near, far, last, shear, is_along, least, is_direction } = *slopes;
+        let [x, y, z] = o.map(|o| o * 0.0 == 0.0);
+        let t_max = if t_max < f32::MAX { t_max } else { f32::MAX };
+        let is_ray = is_direction & x & y & z & (t_min < t_max);
+        let mut far_origin = o;
+        for axis in 0..3 {
+            // A slab along which the ray runs is left a little behind the origin, so that a ray in the very plane
+            // of a face is inside for as long as any ray goes (10¹³ units).
+            let shift = o[axis].abs() * f32::EPSILON;
+            let shift = if shift > least { shift } else { least }.copysign(direction[axis]);
+            far_origin[axis] = if is_along[axis] { o[axis] - shift } else { o[axis] };
+        }
+        let t_min = t_min + 0.0;
+        (Self { origin: o, far_origin, near, far, t_min, t_max, last, shear }, is_ray)
     }
 }
 
@@ -113,7 +129,7 @@ pub(super) struct LoneRay<F> {
 impl<F: Floats<Array = [f32; 8]>> LoneRay<F> {
     /// None where nothing can be hit: a number is not finite, the direction is zero, the ray has no length.
     ///
-    /// The numbers are those of [`RaySetup::of`], which lays out many rays side by side; here it is the three axes that
+    /// The numbers are those of [`RaySetup::new`], which lays out many rays side by side; here it is the three axes that
     /// are.
     #[inline(always)]
     pub(super) fn new<S: Simd<F8 = F>, const ROBUST: bool>(simd: S, ray: &Ray) -> Option<Self> {
@@ -272,7 +288,8 @@ mod tests {
 
     fn check<const ROBUST: bool>(ray: &Ray) -> bool {
         let (o, d) = (ray.origin.to_array(), ray.direction.to_array());
-        let (setup, is_ray) = RaySetup::of::<ROBUST>(o, d, [ray.t_min, ray.t_max]);
+        let slopes = Slopes::of::<ROBUST>(d);
+        let (setup, is_ray) = RaySetup::new(o, &slopes, [ray.t_min, ray.t_max]);
         let lone = LoneRay::new::<_, ROBUST>(Portable, ray);
         assert_eq!(lone.is_some(), is_ray, "{ray:?}");
         let Some(LoneRay { slabs, shear, t_max }) = lone else { return false };
