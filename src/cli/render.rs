@@ -21,7 +21,7 @@ use super::watch::{Schedule, TEV_EVERY, View, Watch};
 use super::{Failure, Outcome, print, report, tell, warn};
 use crate::film::{Aov, PixelRect};
 use crate::io::{Attribute, ExrCompression, TevImage};
-use crate::render::{RenderJob, Rendered, Stop, StopRules, resume};
+use crate::render::{RenderJob, Rendered, Start, Stop, StopRules, render_from};
 use crate::scene::Scene;
 
 /// Samples at which a render ends that was to reach an error or a time.
@@ -31,6 +31,7 @@ const MOST_SAMPLES: u32 = 1 << 24;
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(super) struct Phases {
     pub(super) read: f64,
+    /// Of all that there must be before the first ray: hierarchies, lights, the film.
     pub(super) build: f64,
     pub(super) render: f64,
     pub(super) write: f64,
@@ -68,9 +69,11 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         let samples = state.samples().len();
         print(&format!("{:>10}  from {samples} samples of every pixel", "goes on"));
     }
+    let begin = || pool.install(|| state.map_or_else(|| Start::blank(&scene, &job), Start::State));
+    let begin = timed(&mut phases.build, begin);
     let watch = Watch { progress: Progress::new(quiet, "render"), keeper, views };
     let rendered = timed(&mut phases.render, || {
-        let rendered = pool.install(|| resume(&scene, &job, state, &watch));
+        let rendered = pool.install(|| render_from(begin, &scene, &job, &watch));
         watch.progress.finish();
         rendered
     });
@@ -93,11 +96,11 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
     Ok(Outcome::Done)
 }
 
-/// Runs a phase and notes its seconds.
+/// Runs a phase, or a part of one, and adds its seconds.
 fn timed<T>(seconds: &mut f64, phase: impl FnOnce() -> T) -> T {
     let clock = Instant::now();
     let result = phase();
-    *seconds = clock.elapsed().as_secs_f64();
+    *seconds += clock.elapsed().as_secs_f64();
     result
 }
 

@@ -54,6 +54,25 @@ pub struct RenderJob {
     pub is_adaptive: bool,
 }
 
+impl RenderJob {
+    /// The part of the picture.
+    fn window(&self, scene: &Scene) -> PixelRect {
+        let whole = PixelRect::whole(scene.size);
+        self.crop.map_or(whole, |crop| crop.intersection(&whole))
+    }
+
+    fn rules(&self, scene: &Scene) -> StopRules {
+        let samples = self.first_sample + scene.settings.samples;
+        self.stop.unwrap_or(StopRules { samples, error: None, deadline: None })
+    }
+
+    /// Whether sums are kept: only where something may go on from there.
+    fn is_kept(&self, rules: &StopRules) -> bool {
+        let goes_on = self.keep_state || self.pass_time.is_some() || self.first_sample > 0;
+        goes_on || rules.look_at_the_film()
+    }
+}
+
 /// Hears how a render goes, and ends it. Called from all threads.
 pub trait Observer: Sync {
     /// A share of the work is done, from 0 to 1.
@@ -146,38 +165,58 @@ impl NonFinite {
 /// instruction set alone, not on the number of threads or their order (but for surfaces that coincide
 /// in a hierarchy built at low quality).
 pub fn render(scene: &Scene, job: &RenderJob, observer: &dyn Observer) -> Rendered {
-    resume(scene, job, None, observer)
+    render_from(Start::blank(scene, job), scene, job, observer)
 }
 
-/// Goes on with a render of the same scene and job, to the picture that it would have become.
-pub fn resume(
+/// What a render begins with.
+#[derive(Debug)]
+pub enum Start {
+    /// No sample, and a black film.
+    Blank(Film),
+    /// What another of the same scene and job had come to: the picture will be what that would have become.
+    State(RenderState),
+}
+
+impl Start {
+    /// With no sample. Most of the time that it takes goes into asking the system for memory.
+    pub fn blank(scene: &Scene, job: &RenderJob) -> Self {
+        let window = job.window(scene);
+        let rules = job.rules(scene);
+        let mut film = Film::new(scene.size, window, rules.samples > 1 || job.is_kept(&rules));
+        film.layers = Layers::new(&job.layers, window.area());
+        Self::Blank(film)
+    }
+}
+
+/// [`render`], from wherever it begins.
+pub fn render_from(
+    start: Start,
     scene: &Scene,
     job: &RenderJob,
-    state: Option<RenderState>,
     observer: &dyn Observer,
 ) -> Rendered {
     // Static dispatch from here on: one loop of those that are compiled is run.
-    with_accel!(&scene.accel, query => choose(scene, query, job, state, observer))
+    with_accel!(&scene.accel, query => choose(scene, query, job, start, observer))
 }
 
 fn choose<Q: RayQuery>(
     scene: &Scene,
     query: &Q,
     job: &RenderJob,
-    state: Option<RenderState>,
+    start: Start,
     observer: &dyn Observer,
 ) -> Rendered {
     let depth = match scene.settings.integrator {
-        IntegratorKind::Flat => return run(scene, query, &Flat, job, state, observer),
-        IntegratorKind::Ao => return run(scene, query, &Ao, job, state, observer),
+        IntegratorKind::Flat => return run(scene, query, &Flat, job, start, observer),
+        IntegratorKind::Ao => return run(scene, query, &Ao, job, start, observer),
         IntegratorKind::Direct => None,
         IntegratorKind::Whitted => Some(scene.settings.max_depth),
     };
     match job.variant.unwrap_or(scene.requirements.variant) {
-        Variant::Local => run(scene, query, &Whitted::<Local>::new(depth), job, state, observer),
-        Variant::Tree => run(scene, query, &Whitted::<Tree>::new(depth), job, state, observer),
+        Variant::Local => run(scene, query, &Whitted::<Local>::new(depth), job, start, observer),
+        Variant::Tree => run(scene, query, &Whitted::<Tree>::new(depth), job, start, observer),
         Variant::Everything => {
-            run(scene, query, &Whitted::<Everything>::new(depth), job, state, observer)
+            run(scene, query, &Whitted::<Everything>::new(depth), job, start, observer)
         }
     }
 }
@@ -187,19 +226,14 @@ fn run<Q: RayQuery, I: Integrator>(
     query: &Q,
     integrator: &I,
     job: &RenderJob,
-    state: Option<RenderState>,
+    start: Start,
     observer: &dyn Observer,
 ) -> Rendered {
-    let whole = PixelRect::whole(scene.size);
-    let window = job.crop.map_or(whole, |crop| crop.intersection(&whole));
-    let end = job.first_sample + scene.settings.samples;
-    let rules = job.stop.unwrap_or(StopRules { samples: end, error: None, deadline: None });
-    // Sums are kept only where something may go on from there.
-    let is_kept = rules.look_at_the_film()
-        || job.keep_state
-        || job.pass_time.is_some()
-        || job.first_sample > 0
-        || state.is_some();
+    let (window, rules) = (job.window(scene), job.rules(scene));
+    let (film, state, is_kept) = match start {
+        Start::Blank(film) => (film, None, job.is_kept(&rules)),
+        Start::State(state) => (state.film(scene.size), Some(state), true),
+    };
     let filter = FilterTable::new(scene.settings.filter);
     let layers = SampledLayers::new(scene, &job.layers);
     let renderer =
@@ -207,14 +241,7 @@ fn run<Q: RayQuery, I: Integrator>(
     let mut run = Run {
         renderer,
         observer,
-        film: Mutex::new(match &state {
-            Some(state) => state.film(scene.size),
-            None => {
-                let mut film = Film::new(scene.size, window, is_kept || rules.samples > 1);
-                film.layers = Layers::new(&job.layers, window.area());
-                film
-            }
-        }),
+        film: Mutex::new(film),
         tiles: Vec::new(),
         totals: Mutex::new((RayCounts::default(), NonFinite::default())),
         samples_done: AtomicU64::new(0),
