@@ -1,14 +1,16 @@
 //! Builds a tree: the surface area heuristic over bins, top down, in parallel, and the same tree
 //! whatever the number of threads.
 //!
-//! A node takes the box of largest area among its children and splits it in two, until it has eight of
-//! them. Sources: Wald, *On fast construction of SAH-based bounding volume hierarchies*, RT 2007 (bins);
-//! Wald, Benthin, Boulos, *Getting rid of packets*, RT 2008 (wide nodes).
+//! A large node takes the box of largest area among its children and splits it in two, until it has eight of
+//! them. What is below is split in two down to leaves, and then made nodes of eight (see [`super::collapse`]).
+//! Sources: Wald, *On fast construction of SAH-based bounding volume hierarchies*, RT 2007 (bins); Wald, Benthin,
+//! Boulos, *Getting rid of packets*, RT 2008 (wide nodes).
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::super::AccelError;
+use super::collapse::Halves;
 use super::node::{Child, Node, SphereBlock, Tree, TriangleBlock, WIDTH};
 use super::watch::Watch;
 use crate::geometry::Sphere;
@@ -18,9 +20,14 @@ use crate::pages::prefer_large;
 /// geometrically would make a tree as deep as they are many.
 const SAH_DEPTH: usize = 24;
 
-/// No tree is deeper than this: each level of halves has an eighth of the primitives of the one above it,
-/// rounded up, or one level more where a node was filled unevenly; there are fewer than 2³² of them.
+/// No tree is deeper than this. Among large nodes each level of halves has an eighth of the primitives of the one
+/// above it, rounded up, or one level more where a node was filled unevenly, and there are fewer than 2³² of
+/// them: no more than eight levels. What is below has [`EVEN_DEPTH`] at most.
 pub(super) const MAX_DEPTH: usize = SAH_DEPTH + 24;
+
+/// Levels of halves of equal number below large nodes, at most: each has at most half of the primitives, rounded
+/// up, of the one above it, and there are fewer than [`TASK`].
+const EVEN_DEPTH: usize = 13;
 
 /// Bins an axis, at most, and of small parts.
 const BINS: usize = 32;
@@ -117,6 +124,12 @@ impl Box4 {
     fn add(&mut self, lower: Vec4, upper: Vec4) {
         self.lower = self.lower.min(lower);
         self.upper = self.upper.max(upper);
+    }
+
+    /// The same in the corner of space, on a scale that makes no side longer than one.
+    fn scaled(&self, scale: f32) -> Self {
+        // One where a side is longer than numbers are.
+        Self { lower: Vec4::ZERO, upper: ((self.upper - self.lower) * scale).min(Vec4::ONE) }
     }
 
     /// Half its area.
@@ -254,41 +267,63 @@ impl Builder<'_> {
 
     /// Appends the node over `part`, and all that is below it.
     fn append(&self, tree: &mut Subtree, part: Part, depth: usize) {
-        let is_large = part.refs.len() >= TASK;
-        if is_large && self.watch.is_stopped() {
-            return;
-        }
-        let len = part.refs.len() as u64;
-        let parts = self.children(part, depth);
-        let mut node = Node::EMPTY;
-        let index = tree.nodes.len();
-        tree.nodes.push(node);
-        if is_large {
-            let build = |part: Part| {
-                let (bounds, len) = (part.bounds, part.refs.len());
-                let mut subtree = Subtree::default();
-                let child = self.child(&mut subtree, part, depth);
-                if len < TASK {
-                    self.watch.add(len as u64);
-                }
-                (bounds, child, subtree)
-            };
-            let subtrees: Vec<_> = parts.into_par_iter().map(build).collect();
-            for (lane, (bounds, child, subtree)) in subtrees.into_iter().enumerate() {
-                set(&mut node, lane, &bounds, tree.moved(child));
-                tree.merge(subtree);
-            }
-        } else {
-            for (lane, part) in parts.into_iter().enumerate() {
-                let bounds = part.bounds;
-                let child = self.child(tree, part, depth);
-                set(&mut node, lane, &bounds, child);
-            }
+        if part.refs.len() < TASK {
+            let len = part.refs.len() as u64;
+            self.append_small(tree, part, depth);
             if depth == 0 {
                 self.watch.add(len);
             }
+            return;
+        }
+        if self.watch.is_stopped() {
+            return;
+        }
+        let mut node = Node::EMPTY;
+        let index = tree.nodes.len();
+        tree.nodes.push(node);
+        let build = |part: Part| {
+            let (bounds, len) = (part.bounds, part.refs.len());
+            let mut subtree = Subtree::default();
+            let child = self.child(&mut subtree, part, depth);
+            if len < TASK {
+                self.watch.add(len as u64);
+            }
+            (bounds, child, subtree)
+        };
+        let subtrees: Vec<_> = self.children(part, depth).into_par_iter().map(build).collect();
+        for (lane, (bounds, child, subtree)) in subtrees.into_iter().enumerate() {
+            set(&mut node, lane, &bounds, tree.moved(child));
+            tree.merge(subtree);
         }
         tree.nodes[index] = node;
+    }
+
+    /// The same for a part that one thread builds.
+    fn append_small(&self, tree: &mut Subtree, part: Part, depth: usize) {
+        let extent = (part.bounds.upper - part.bounds.lower).truncate().max_element();
+        let scale = extent.max(f32::MIN_POSITIVE).recip();
+        let mut halves = Halves::new();
+        self.halve(&mut halves, part, depth, scale);
+        tree.append(&halves, 0);
+    }
+
+    /// Adds a part to `halves`, split down to leaves. `scale` is one by the longest side of the whole.
+    fn halve(&self, halves: &mut Halves<Piece>, part: Part, depth: usize, scale: f32) {
+        let bounds = part.bounds;
+        if part.is_leaf() {
+            halves.add((bounds, Some(LeafOf::new(&part))));
+            return;
+        }
+        let place = halves.add((bounds, None));
+        let split = (depth < MAX_DEPTH - EVEN_DEPTH).then(|| self.best_split(&part)).flatten();
+        let [first, second] = match split {
+            Some(split) => split.apply(part),
+            None => halve_evenly(part),
+        };
+        self.halve(halves, first, depth + 1, scale);
+        let start = halves.len();
+        self.halve(halves, second, depth + 1, scale);
+        halves.join(place, start, bounds.scaled(scale).area());
     }
 
     /// Appends what is in a child of a node at `depth`.
@@ -298,22 +333,7 @@ impl Builder<'_> {
             self.append(tree, part, depth + 1);
             return Child::node(index);
         }
-        let first = part.refs[0];
-        let leaf = Leaf { start: part.start as u32, len: part.refs.len() as u32 };
-        match first.kind() {
-            Kind::Item => {
-                tree.has_items = true;
-                Child::item(first.id())
-            }
-            Kind::Triangle => {
-                tree.leaves.push(leaf);
-                Child::triangles(tree.leaves.len() - 1)
-            }
-            Kind::Sphere => {
-                tree.balls.push(leaf);
-                Child::spheres(tree.balls.len() - 1)
-            }
-        }
+        tree.leaf(&LeafOf::new(&part))
     }
 
     /// Cuts a part into those of the children of one node.
@@ -336,7 +356,7 @@ impl Builder<'_> {
             let split = (depth < SAH_DEPTH).then(|| self.best_split(&part)).flatten();
             parts.extend(match split {
                 Some(split) => split.apply(part),
-                None => halves(part),
+                None => halve_evenly(part),
             });
         }
         parts
@@ -412,7 +432,61 @@ fn set(node: &mut Node, lane: usize, bounds: &Box4, child: Child) {
     node.set(lane, corner(bounds.lower), corner(bounds.upper), child);
 }
 
+/// What will be a leaf.
+struct LeafOf {
+    kind: Kind,
+    /// The number of the first primitive.
+    id: u32,
+    at: Leaf,
+}
+
+impl LeafOf {
+    fn new(part: &Part) -> Self {
+        let first = part.refs[0];
+        let at = Leaf { start: part.start as u32, len: part.refs.len() as u32 };
+        Self { kind: first.kind(), id: first.id(), at }
+    }
+}
+
+/// A part of a tree of halves: its box, and what leaf it is, if it is one.
+type Piece = (Box4, Option<LeafOf>);
+
 impl Subtree {
+    /// Appends the node that the part at `place` is made, and all that is below it.
+    fn append(&mut self, halves: &Halves<Piece>, place: usize) -> Child {
+        let mut node = Node::EMPTY;
+        let index = self.nodes.len();
+        self.nodes.push(node);
+        for (lane, child) in halves.children(place).into_iter().enumerate() {
+            let (bounds, leaf) = halves.get(child);
+            let below = match leaf {
+                Some(leaf) => self.leaf(leaf),
+                None => self.append(halves, child),
+            };
+            set(&mut node, lane, bounds, below);
+        }
+        self.nodes[index] = node;
+        Child::node(index)
+    }
+
+    /// Appends a leaf.
+    fn leaf(&mut self, leaf: &LeafOf) -> Child {
+        match leaf.kind {
+            Kind::Item => {
+                self.has_items = true;
+                Child::item(leaf.id)
+            }
+            Kind::Triangle => {
+                self.leaves.push(leaf.at);
+                Child::triangles(self.leaves.len() - 1)
+            }
+            Kind::Sphere => {
+                self.balls.push(leaf.at);
+                Child::spheres(self.balls.len() - 1)
+            }
+        }
+    }
+
     /// A child of a subtree that is about to be merged.
     fn moved(&self, child: Child) -> Child {
         use super::node::Content;
@@ -573,7 +647,7 @@ impl Split {
 }
 
 /// Splits a part in the middle of what order it is in.
-fn halves(part: Part) -> [Part; 2] {
+fn halve_evenly(part: Part) -> [Part; 2] {
     let middle = part.refs.len() / 2;
     let (left, right) = part.refs.split_at_mut(middle);
     [Part::new(left, part.start), Part::new(right, part.start + middle)]

@@ -5,6 +5,7 @@
 //! lanes; other shapes are solved by themselves, in f64, as are spheres that a ray may hit.
 
 mod build;
+mod collapse;
 mod group;
 mod node;
 mod packet;
