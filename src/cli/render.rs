@@ -31,7 +31,7 @@ const MOST_SAMPLES: u32 = 1 << 24;
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(super) struct Phases {
     pub(super) read: f64,
-    /// Of all that there must be before the first ray: hierarchies, lights, the film.
+    /// Of what there must be before the first ray: hierarchies, lights, a blank film.
     pub(super) build: f64,
     pub(super) render: f64,
     pub(super) write: f64,
@@ -69,11 +69,12 @@ pub(super) fn render(args: &RenderArgs, start: Instant) -> Result<Outcome, Failu
         let samples = state.samples().len();
         print(&format!("{:>10}  from {samples} samples of every pixel", "goes on"));
     }
-    let begin = || pool.install(|| state.map_or_else(|| Start::blank(&scene, &job), Start::State));
-    let begin = timed(&mut phases.build, begin);
+    let blank = || Start::blank(&scene, &job);
+    let from = || pool.install(|| state.map_or_else(blank, Start::from_state));
+    let from = timed(&mut phases.build, from);
     let watch = Watch { progress: Progress::new(quiet, "render"), keeper, views };
     let rendered = timed(&mut phases.render, || {
-        let rendered = pool.install(|| render_from(begin, &scene, &job, &watch));
+        let rendered = pool.install(|| render_from(from, &scene, &job, &watch));
         watch.progress.finish();
         rendered
     });

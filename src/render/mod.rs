@@ -168,27 +168,33 @@ pub fn render(scene: &Scene, job: &RenderJob, observer: &dyn Observer) -> Render
     render_from(Start::blank(scene, job), scene, job, observer)
 }
 
-/// What a render begins with.
+/// What a render of a scene and a job begins with.
 #[derive(Debug)]
-pub enum Start {
-    /// No sample, and a black film.
+pub struct Start(Beginning);
+
+#[derive(Debug)]
+enum Beginning {
     Blank(Film),
-    /// What another of the same scene and job had come to: the picture will be what that would have become.
     State(RenderState),
 }
 
 impl Start {
-    /// With no sample. Most of the time that it takes goes into asking the system for memory.
+    /// No sample, and a black film. Most of the time that it takes goes into asking the system for memory.
     pub fn blank(scene: &Scene, job: &RenderJob) -> Self {
         let window = job.window(scene);
         let rules = job.rules(scene);
         let mut film = Film::new(scene.size, window, rules.samples > 1 || job.is_kept(&rules));
         film.layers = Layers::new(&job.layers, window.area());
-        Self::Blank(film)
+        Self(Beginning::Blank(film))
+    }
+
+    /// What another render of the same scene and job had come to: the picture will be what that would have become.
+    pub const fn from_state(state: RenderState) -> Self {
+        Self(Beginning::State(state))
     }
 }
 
-/// [`render`], from wherever it begins.
+/// [`render`], from where it begins: a start of the same scene and job.
 pub fn render_from(
     start: Start,
     scene: &Scene,
@@ -230,9 +236,9 @@ fn run<Q: RayQuery, I: Integrator>(
     observer: &dyn Observer,
 ) -> Rendered {
     let (window, rules) = (job.window(scene), job.rules(scene));
-    let (film, state, is_kept) = match start {
-        Start::Blank(film) => (film, None, job.is_kept(&rules)),
-        Start::State(state) => (state.film(scene.size), Some(state), true),
+    let (film, state, is_kept) = match start.0 {
+        Beginning::Blank(film) => (film, None, job.is_kept(&rules)),
+        Beginning::State(state) => (state.film(scene.size), Some(state), true),
     };
     let filter = FilterTable::new(scene.settings.filter);
     let layers = SampledLayers::new(scene, &job.layers);

@@ -34,7 +34,7 @@ impl Sampler {
     ) -> [[f32; N]; D] {
         // The algorithm of `sobol_burley::sample`, whose scrambles these are.
         const SCRAMBLES: [u32; 4] = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
-        // Apart from the scrambles: loops that pick fields out of structures are not made ones over lanes whole.
+        // In a loop of its own: one that picks fields out of structures does not become vector instructions.
         let (mut seeds, mut index) = ([0; N], [0; N]);
         for (i, sampler) in samplers.iter().enumerate() {
             (seeds[i], index[i]) = (sampler.stream_of(dimensions), sampler.index);

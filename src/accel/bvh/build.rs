@@ -16,18 +16,27 @@ use super::watch::Watch;
 use crate::geometry::Sphere;
 use crate::pages::prefer_large;
 
-/// Below so many levels of nodes, boxes are split in halves of equal number: coordinates that grow
-/// geometrically would make a tree as deep as they are many.
+/// Below so many levels, large boxes are split in halves of equal number: coordinates that grow geometrically would
+/// make a tree as deep as they are many.
 const SAH_DEPTH: usize = 24;
 
-/// No tree is deeper than this. Among large nodes each level of halves has an eighth of the primitives of the one
-/// above it, rounded up, or one level more where a node was filled unevenly, and there are fewer than 2³² of
-/// them: no more than eight levels. What is below has [`EVEN_DEPTH`] at most.
-pub(super) const MAX_DEPTH: usize = SAH_DEPTH + 24;
+/// Levels of large boxes below that: each has an eighth of the primitives of the one above it, rounded up, or there
+/// is one level more where a node was filled unevenly; 2³² of them are 2¹² after seven.
+const LARGE_EVEN_DEPTH: usize = 8;
 
-/// Levels of halves of equal number below large nodes, at most: each has at most half of the primitives, rounded
-/// up, of the one above it, and there are fewer than [`TASK`].
-const EVEN_DEPTH: usize = 13;
+/// The same of boxes that one thread builds, of fewer than [`TASK`]: each has half the primitives, rounded up.
+const SMALL_EVEN_DEPTH: usize = 13;
+
+/// Below so many levels these are split in halves of equal number.
+const SMALL_SAH_DEPTH: usize = MAX_DEPTH - SMALL_EVEN_DEPTH;
+
+/// No tree is deeper than this.
+pub(super) const MAX_DEPTH: usize = 48;
+
+const _: () = assert!(
+    SAH_DEPTH + LARGE_EVEN_DEPTH <= SMALL_SAH_DEPTH && TASK < 1 << SMALL_EVEN_DEPTH,
+    "no tree is deeper than that"
+);
 
 /// Bins an axis, at most, and of small parts.
 const BINS: usize = 32;
@@ -303,26 +312,22 @@ impl Builder<'_> {
         let extent = (part.bounds.upper - part.bounds.lower).truncate().max_element();
         let scale = extent.max(f32::MIN_POSITIVE).recip();
         let mut halves = Halves::new();
-        self.halve(&mut halves, part, depth, scale);
+        self.add_halves(&mut halves, part, depth, scale);
         tree.append(&halves, 0);
     }
 
     /// Adds a part to `halves`, split down to leaves. `scale` is one by the longest side of the whole.
-    fn halve(&self, halves: &mut Halves<Piece>, part: Part, depth: usize, scale: f32) {
+    fn add_halves(&self, halves: &mut Halves<Piece>, part: Part, depth: usize, scale: f32) {
         let bounds = part.bounds;
         if part.is_leaf() {
             halves.add((bounds, Some(LeafOf::new(&part))));
             return;
         }
         let place = halves.add((bounds, None));
-        let split = (depth < MAX_DEPTH - EVEN_DEPTH).then(|| self.best_split(&part)).flatten();
-        let [first, second] = match split {
-            Some(split) => split.apply(part),
-            None => halve_evenly(part),
-        };
-        self.halve(halves, first, depth + 1, scale);
+        let [first, second] = self.cut(part, depth < SMALL_SAH_DEPTH);
+        self.add_halves(halves, first, depth + 1, scale);
         let start = halves.len();
-        self.halve(halves, second, depth + 1, scale);
+        self.add_halves(halves, second, depth + 1, scale);
         halves.join(place, start, bounds.scaled(scale).area());
     }
 
@@ -353,13 +358,17 @@ impl Builder<'_> {
                 break;
             };
             let part = parts.swap_remove(largest);
-            let split = (depth < SAH_DEPTH).then(|| self.best_split(&part)).flatten();
-            parts.extend(match split {
-                Some(split) => split.apply(part),
-                None => halve_evenly(part),
-            });
+            parts.extend(self.cut(part, depth < SAH_DEPTH));
         }
         parts
+    }
+
+    /// Cuts a part in two: where it is best, or else, and where that cannot be told, in the middle.
+    fn cut<'p>(&self, part: Part<'p>, is_best: bool) -> [Part<'p>; 2] {
+        match is_best.then(|| self.best_split(&part)).flatten() {
+            Some(split) => split.apply(part),
+            None => halve_evenly(part),
+        }
     }
 
     /// The best split between bins, if the centres differ at all.

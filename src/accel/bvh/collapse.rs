@@ -2,13 +2,14 @@
 //!
 //! By the surface area heuristic a node costs its area, and leaves are what they are: so the best that a part can
 //! become follows from the best that its halves can. Source: Ylitie, Karras, Laine, *Efficient incoherent ray
-//! traversal on GPUs through compressed wide BVHs*, HPG 2017, section 3.1. Nodes that are filled from above, with
+//! traversal on GPUs through compressed wide BVHs*, HPG 2017. Nodes that are filled from above, with
 //! the halves of what is largest, leave half of their places empty at the bottom of the tree, where most of them
 //! are.
 
 use super::node::WIDTH;
 
-/// What a node costs beside its area, of which the largest is 3 at most: in flat parts fewer nodes are better too.
+/// What a node costs beside its area, of which the largest is 3 at most: where parts have none, as points and lines
+/// along an axis, fewer nodes are better too.
 const NODE: f32 = 1e-6;
 
 /// A part, and how it is best put into nodes.
@@ -18,8 +19,8 @@ struct Half<T> {
     second: Option<usize>,
     /// What it costs as no more than so many children of a node, from one on.
     cost: [f32; WIDTH - 1],
-    /// How many of so many children, from one on, are to be of its first half; none where fewer children cost
-    /// no more. Of one, as many as the node has that it then is.
+    /// How many of so many children, from two on, are to be of its first half; none where fewer children cost
+    /// no more. In the first place: as one child it is a node, and so many of that one's are of the first half.
     first: [u8; WIDTH - 1],
 }
 

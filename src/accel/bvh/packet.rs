@@ -271,7 +271,7 @@ impl Packet {
     }
 }
 
-/// The least and the greatest of numbers none of which is NaN.
+/// The least and the greatest of numbers; of no matter what where one is NaN, as in a packet without rays.
 #[inline(always)]
 fn ends<S: Simd>(simd: S, numbers: &[f32; LANES]) -> [f32; 2] {
     let (lanes, first) = (simd.load16(numbers), simd.splat16(numbers[0]));

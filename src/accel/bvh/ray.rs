@@ -48,7 +48,7 @@ pub(super) struct Slopes {
     is_along: [bool; 3],
     /// How far short of the origin such a slab is left, at least.
     least: f32,
-    /// Whether it is one: neither zero nor NaN.
+    /// Whether it is one: finite, and not zero.
     is_direction: bool,
 }
 
