@@ -47,22 +47,22 @@ impl<T> Halves<T> {
     /// of its box, by a scale that makes no side longer than one.
     pub(super) fn join(&mut self, place: usize, second: usize, area: f32) {
         let (a, b) = (&self.0[place + 1].cost, &self.0[second].cost);
+        // Of so many children, what is below costs least with how many of the first half.
         let best = |children: usize| {
-            let most = children.min(WIDTH) - 1;
-            let costs = (1..=most).map(|k| (a[k - 1] + b[children - k - 1], k as u8));
-            costs.reduce(|best, other| if other.0 < best.0 { other } else { best })
+            let of = |k: usize| (a[k - 1] + b[children - k - 1], k as u8);
+            (2..children)
+                .map(of)
+                .fold(of(1), |best, other| if other.0 < best.0 { other } else { best })
         };
         let (mut cost, mut first) = ([0.0; WIDTH - 1], [0; WIDTH - 1]);
-        if let Some((below, k)) = best(WIDTH) {
-            (cost[0], first[0]) = (area + NODE + below, k);
-        }
+        (cost[0], first[0]) = best(WIDTH);
+        cost[0] += area + NODE;
         for children in 2..WIDTH {
-            cost[children - 1] = cost[children - 2];
-            if let Some((apart, k)) = best(children)
-                && apart < cost[children - 1]
-            {
-                (cost[children - 1], first[children - 1]) = (apart, k);
-            }
+            let (apart, k) = best(children);
+            (cost[children - 1], first[children - 1]) = match cost[children - 2] {
+                fewer if apart < fewer => (apart, k),
+                fewer => (fewer, 0),
+            };
         }
         let half = &mut self.0[place];
         (half.second, half.cost, half.first) = (Some(second), cost, first);
